@@ -1,0 +1,102 @@
+"""Composes a scene's MJCF tree: tabletop, robot, cameras, and one free body per object."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from dm_control import mjcf
+
+from models.camera_mjcf import add_cameras
+from models.cameras import camera_preset
+from models.objects.asset import ObjectAsset
+from models.objects.mjcf_builder import build_object
+from models.robot import ARM_ACTUATORS, ARM_JOINTS, attach_robot
+from models.tabletop import build_tabletop
+from models.ur5 import HOME_QPOS
+from sr_mj.scene.settle import FreeBody
+
+OBJECT_BODY = "object"
+"""Name of the body in every object's tree."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComposedScene:
+    """A scene before its objects have been put anywhere.
+
+    Attributes:
+        root: MJCF tree.
+        model: The compiled tree.
+        bodies: The objects' places in the model, in the order given.
+    """
+
+    root: mjcf.RootElement
+    model: mujoco.MjModel
+    bodies: tuple[FreeBody, ...]
+
+
+def compile_mjcf(root: mjcf.RootElement) -> mujoco.MjModel:
+    """Compile an MJCF tree.
+
+    Args:
+        root: The tree.
+
+    Returns:
+        The model.
+    """
+    return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+
+
+def _free_body(model: mujoco.MjModel, asset: ObjectAsset) -> FreeBody:
+    # dm_control attaches through a frame body, which carries the joint; the object is its child.
+    joint = model.joint(int(model.body(f"{asset.name}/").jntadr[0]))
+    return FreeBody(
+        name=asset.name,
+        body_id=model.body(f"{asset.name}/{OBJECT_BODY}").id,
+        qpos_adr=int(joint.qposadr[0]),
+        dof_adr=int(joint.dofadr[0]),
+        bottom_m=-float(asset.vertices[:, 2].min()),
+        radius_m=float(np.linalg.norm(asset.vertices, axis=1).max()),
+    )
+
+
+def compose_scene(
+    assets: Sequence[ObjectAsset], cameras: str, model_name: str = "scene"
+) -> ComposedScene:
+    """Compose and compile a scene.
+
+    Args:
+        assets: The objects; their names become prefixes (`apple/`).
+        cameras: Camera preset.
+        model_name: Name of the MJCF model.
+
+    Returns:
+        The scene, objects at the world's origin.
+    """
+    root = build_tabletop(model_name)
+    attach_robot(root)
+    add_cameras(root, camera_preset(cameras))
+    for asset in assets:
+        frame = root.attach(build_object(asset, name=asset.name))
+        frame.add("freejoint")
+    model = compile_mjcf(root)
+    return ComposedScene(
+        root=root, model=model, bodies=tuple(_free_body(model, asset) for asset in assets)
+    )
+
+
+def home_state(model: mujoco.MjModel) -> mujoco.MjData:
+    """Return a fresh state with the arm at home and the gripper closed.
+
+    Args:
+        model: A model that contains the robot of `models.robot`.
+
+    Returns:
+        The state, after a forward pass.
+    """
+    data = mujoco.MjData(model)
+    for joint, actuator, angle in zip(ARM_JOINTS, ARM_ACTUATORS, HOME_QPOS, strict=True):
+        data.joint(joint).qpos[0] = angle
+        data.actuator(actuator).ctrl[0] = angle
+    mujoco.mj_forward(model, data)
+    return data

@@ -1,0 +1,102 @@
+"""What a scene is made from: the registry of kinds of scene, and the configuration of one."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from models.tabletop import GRASP_WORKSPACE, PICK_PLACE_WORKSPACE, Workspace
+from sr_mj.errors import ConfigError, UnknownNameError, unknown_name_message
+
+Split = Literal["seen", "unseen"]
+SPLITS: tuple[Split, ...] = ("seen", "unseen")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneKind:
+    """How many objects of a scene are arranged, and how.
+
+    Attributes:
+        num_heaped: Objects dropped one after another into one region, so that they stack.
+        num_spread: Objects set down apart from each other.
+        workspace: Box that the objects must stay in and that perception looks at.
+        heap_center: x, y about which heaped objects drop, metres.
+        heap_half_m: Half width of the square in which they drop.
+        spread_lower: Smallest x, y of the centres of spread objects.
+        spread_upper: Largest x, y of the centres of spread objects.
+        min_spacing_m: Least distance between the centres of spread objects.
+        description: One line for people.
+    """
+
+    description: str
+    num_heaped: int = 0
+    num_spread: int = 0
+    workspace: Workspace = GRASP_WORKSPACE
+    heap_center: tuple[float, float] = (0.5, 0.0)
+    heap_half_m: float = 0.13
+    spread_lower: tuple[float, float] = (0.33, -0.17)
+    spread_upper: tuple[float, float] = (0.67, 0.17)
+    min_spacing_m: float = 0.1
+
+    @property
+    def num_objects(self) -> int:
+        """Number of objects in the scene."""
+        return self.num_heaped + self.num_spread
+
+
+SCENE_KINDS: dict[str, SceneKind] = {
+    "cluttered15": SceneKind(num_heaped=15, description="15 objects dropped at random, stacked"),
+    "place8": SceneKind(num_spread=8, description="8 objects set apart, centres 0.1 m or more"),
+    "pickplace8": SceneKind(
+        num_heaped=5,
+        num_spread=3,
+        workspace=PICK_PLACE_WORKSPACE,
+        heap_center=(0.5, -0.17),
+        heap_half_m=0.09,
+        spread_lower=(0.33, 0.10),
+        spread_upper=(0.67, 0.26),
+        description="5 objects heaped in the grasp zone (y < 0), 3 set apart in the place zone",
+    ),
+    "single": SceneKind(num_heaped=1, heap_half_m=0.08, description="one object alone"),
+    "empty": SceneKind(description="robot, table and bin without objects"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneConfig:
+    """One scene, completely determined: the same configuration gives the same bytes.
+
+    Attributes:
+        scene: Kind of scene, one of `SCENE_KINDS`.
+        split: Which part of the catalogue the objects come from.
+        seed: Draws the objects, how they fall, and the goal.
+        goal: The instruction; drawn from the protocol's templates when None.
+        objects: Names of catalogue objects to use instead of drawing them; as many as the scene
+            has, or none.
+        cameras: Camera preset, one of `models.cameras.CAMERA_PRESETS`.
+
+    Raises:
+        UnknownNameError: If scene or split do not exist.
+        ConfigError: If the seed is negative or the goal is blank.
+    """
+
+    scene: str = "cluttered15"
+    split: Split = "seen"
+    seed: int = 0
+    goal: str | None = None
+    objects: tuple[str, ...] = ()
+    cameras: str = "sr"
+
+    def __post_init__(self) -> None:
+        """Check names and values."""
+        if self.scene not in SCENE_KINDS:
+            raise UnknownNameError(unknown_name_message("scene", self.scene, SCENE_KINDS))
+        if self.split not in SPLITS:
+            raise UnknownNameError(unknown_name_message("split", self.split, SPLITS))
+        if self.seed < 0:
+            raise ConfigError(f"Seed is {self.seed}; expected an integer of 0 or more.")
+        if self.goal is not None and not self.goal.strip():
+            raise ConfigError("The goal is blank; say what to grasp, or leave the goal out.")
+
+    @property
+    def kind(self) -> SceneKind:
+        """The scene's entry in the registry."""
+        return SCENE_KINDS[self.scene]
