@@ -1,0 +1,1 @@
+"""The SR network: two-stage alignment of language, vision and action."""

@@ -1,0 +1,206 @@
+"""One decision as the network takes it, and padded batches of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import torch
+from jaxtyping import Int
+from torch import Tensor
+
+from policy.actions import ACTION_KINDS, ActionCandidates
+from policy.arrays import checked_array
+from policy.errors import InvalidArrayError
+from policy.network.config import SRConfig
+from policy.network.selection import select_points
+from policy.observation import Observation
+
+
+@dataclass(frozen=True, kw_only=True)
+class SRSample:
+    """One decision: a thinned cloud, an instruction, candidates. Arrays are read-only.
+
+    Attributes:
+        positions: (N, 3) float32 positions; the workspace spans [-1, 1].
+        features: (N, C) float32 visual features.
+        similarity: (N,) float32 similarity to the instruction.
+        tokens: (T, C) float32 features of the instruction's tokens.
+        pooled: (C,) float32 feature of the whole instruction.
+        poses: (K, 7) float32 candidates: normalised position, quaternion x, y, z, w.
+        phase: 0 for pick, 1 for place.
+
+    Raises:
+        InvalidArrayError: If a field has a wrong shape or value, or the fields don't fit.
+    """
+
+    positions: np.ndarray
+    features: np.ndarray
+    similarity: np.ndarray
+    tokens: np.ndarray
+    pooled: np.ndarray
+    poses: np.ndarray
+    phase: int
+
+    def __post_init__(self) -> None:
+        """Check the fields and replace the arrays by read-only copies."""
+        sizes: dict[str, int] = {}
+        shapes: dict[str, tuple[int | str, ...]] = {
+            "positions": ("N", 3),
+            "features": ("N", "C"),
+            "similarity": ("N",),
+            "tokens": ("T", "C"),
+            "pooled": ("C",),
+            "poses": ("K", 7),
+        }
+        for name, shape in shapes.items():
+            array = checked_array(name, getattr(self, name), shape, sizes=sizes)
+            object.__setattr__(self, name, array)
+        if self.phase not in range(len(ACTION_KINDS)):
+            raise InvalidArrayError(f"phase: got {self.phase!r}, expected 0 (pick) or 1 (place).")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SRBatch:
+    """B decisions padded to common sizes N, T and K, each at least 1.
+
+    Attributes:
+        positions: (B, N, 3) normalised positions.
+        features: (B, N, C) visual features.
+        similarity: (B, N) similarity to the instruction.
+        point_mask: (B, N) True for real points.
+        tokens: (B, T, C) token features.
+        token_mask: (B, T) True for real tokens.
+        pooled: (B, C) feature of the instruction.
+        poses: (B, K, 7) normalised candidates.
+        candidate_mask: (B, K) True for real candidates.
+        phase: (B,) int64, 0 for pick and 1 for place.
+    """
+
+    positions: Tensor
+    features: Tensor
+    similarity: Tensor
+    point_mask: Tensor
+    tokens: Tensor
+    token_mask: Tensor
+    pooled: Tensor
+    poses: Tensor
+    candidate_mask: Tensor
+    phase: Tensor
+
+    def to(self, device: torch.device | str) -> "SRBatch":
+        """Copy every tensor to a device."""
+        return SRBatch(**{f.name: getattr(self, f.name).to(device) for f in fields(self)})
+
+    def take_points(self, order: Int[Tensor, "batch points"]) -> "SRBatch":
+        """Reorder the points of every decision.
+
+        Args:
+            order: For each decision a permutation of its points, padding included.
+
+        Returns:
+            The same decisions with their points in that order.
+        """
+        index = order[..., None]
+        return replace(
+            self,
+            positions=self.positions.take_along_dim(index, dim=1),
+            features=self.features.take_along_dim(index, dim=1),
+            similarity=self.similarity.take_along_dim(order, dim=1),
+            point_mask=self.point_mask.take_along_dim(order, dim=1),
+        )
+
+
+def make_sample(
+    observation: Observation, candidates: ActionCandidates, config: SRConfig
+) -> SRSample:
+    """Thin the cloud and normalise positions to the workspace.
+
+    Args:
+        observation: The scene's feature cloud and the instruction.
+        candidates: K candidates.
+        config: Limits the points and says which to take.
+
+    Returns:
+        The decision as the network takes it.
+
+    Raises:
+        InvalidArrayError: If the features have another size than the network's.
+    """
+    if observation.feature_dim != config.feature_dim:
+        raise InvalidArrayError(
+            f"features: got {observation.feature_dim} channels, expected {config.feature_dim} as "
+            "in the network. Use the encoder that the network was trained with."
+        )
+    chosen = select_points(
+        observation.points,
+        observation.similarity,
+        max_points=config.max_points,
+        method=config.point_selection,
+    )
+    center = (observation.workspace_max + observation.workspace_min) / 2
+    half = (observation.workspace_max - observation.workspace_min) / 2
+    poses = candidates.as_pose7()
+    poses[:, :3] = (candidates.positions - center) / half
+    return SRSample(
+        positions=(observation.points[chosen] - center) / half,
+        features=observation.features[chosen],
+        similarity=observation.similarity[chosen],
+        tokens=observation.text_tokens,
+        pooled=observation.text_pooled,
+        poses=poses,
+        phase=ACTION_KINDS.index(candidates.kind),
+    )
+
+
+def collate(samples: Sequence[SRSample]) -> SRBatch:
+    """Pad decisions to common sizes.
+
+    Args:
+        samples: At least one decision, all with the same number of channels.
+
+    Returns:
+        The batch, on the CPU.
+
+    Raises:
+        InvalidArrayError: If there are no samples or their channels differ.
+    """
+    if not samples:
+        raise InvalidArrayError("samples: got 0, expected at least 1.")
+    channels = sorted({sample.features.shape[1] for sample in samples})
+    if len(channels) > 1:
+        raise InvalidArrayError(f"samples: got features of {channels} channels, expected one size.")
+    positions, point_mask = pad([sample.positions for sample in samples])
+    tokens, token_mask = pad([sample.tokens for sample in samples])
+    poses, candidate_mask = pad([sample.poses for sample in samples])
+    return SRBatch(
+        positions=positions,
+        features=pad([sample.features for sample in samples])[0],
+        similarity=pad([sample.similarity for sample in samples])[0],
+        point_mask=point_mask,
+        tokens=tokens,
+        token_mask=token_mask,
+        pooled=torch.from_numpy(np.stack([sample.pooled for sample in samples])),
+        poses=poses,
+        candidate_mask=candidate_mask,
+        phase=torch.tensor([sample.phase for sample in samples]),
+    )
+
+
+def pad(rows: Sequence[np.ndarray]) -> tuple[Tensor, Tensor]:
+    """Stack arrays of different lengths.
+
+    Args:
+        rows: B arrays that agree in all but their first size.
+
+    Returns:
+        (B, L, ...) float32 (or bool) values, zero beyond each array's end, with L at least 1;
+        and the (B, L) mask of real entries.
+    """
+    length = max(1, *(len(row) for row in rows))
+    dtype = np.bool_ if rows[0].dtype == np.bool_ else np.float32
+    values = np.zeros((len(rows), length, *rows[0].shape[1:]), dtype=dtype)
+    mask = np.zeros((len(rows), length), dtype=np.bool_)
+    for i, row in enumerate(rows):
+        values[i, : len(row)] = row
+        mask[i, : len(row)] = True
+    return torch.from_numpy(values), torch.from_numpy(mask)

@@ -1,0 +1,108 @@
+"""The SR network: from a padded batch of decisions to scores of the candidates."""
+
+from dataclasses import replace
+
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from policy.network.alignment import ActionAlignment, LanguageAlignment
+from policy.network.batch import SRBatch
+from policy.network.bias import position_basis
+from policy.network.config import SRConfig
+from policy.network.decoder import ActionDecoder, SROutput
+from policy.network.dssa import DSSALayer
+from policy.network.encoder import EncoderLayer
+from policy.network.encoding import fourier_features, num_fourier_features
+from policy.network.morton import morton_order
+
+
+class SRNetwork(nn.Module):
+    """Two-stage cross-modal alignment with dense-sparse self-attention (section 3.3).
+
+    Stage 1 gates the cloud by the instruction, DSSA lets the points exchange information, stage 2
+    lets every candidate gather from the points, and the decoder scores the candidates. Scores do
+    not depend on the order of the points, nor on padding, and follow the order of the candidates.
+    """
+
+    def __init__(self, config: SRConfig) -> None:
+        """Make a network with random weights.
+
+        Args:
+            config: Size and variant.
+        """
+        super().__init__()
+        self.config = config
+        width, num_heads = config.width, config.num_heads
+        self.visual = nn.Linear(config.feature_dim, width)
+        self.language_alignment = LanguageAlignment(config) if config.one_align else None
+        self.dssa_layers = nn.ModuleList(
+            DSSALayer(width, num_heads, config.num_bias_scales, config.sparsifier)
+            for _ in range(config.num_dssa_layers if config.dssa else 0)
+        )
+        self.action_alignment = ActionAlignment(config)
+        self.position = nn.Linear(num_fourier_features(config.num_fourier_bands), width)
+        self.encoder_layers = nn.ModuleList(
+            EncoderLayer(width, num_heads, config.self_attention)
+            for _ in range(config.num_encoder_layers)
+        )
+        self.decoder = ActionDecoder(config)
+
+    def forward(self, batch: SRBatch) -> SROutput:
+        """Score the candidates of a batch of decisions.
+
+        Args:
+            batch: B decisions, padded to N points, T tokens and K candidates.
+
+        Returns:
+            Scores (B, K), minus infinity on padding, and the decoded action parameters.
+        """
+        if self.config.dssa:
+            # The convolution of eq. (9) needs rows and columns whose neighbours are neighbours in
+            # space; the paper names no order.
+            batch = batch.take_points(morton_order(batch.positions, batch.point_mask))
+        states = self.action_alignment(
+            batch.poses,
+            batch.phase,
+            batch.positions,
+            batch.features,
+            self._values(batch),
+            batch.point_mask,
+        )
+        waves = fourier_features(batch.poses[..., :3], self.config.num_fourier_bands)
+        states = states + self.position(waves)
+        for layer in self.encoder_layers:
+            states = layer(states, batch.candidate_mask)
+        output = self.decoder(states)
+        logits = output.logits.masked_fill(~batch.candidate_mask, float("-inf"))
+        return replace(output, logits=logits)
+
+    def _values(self, batch: SRBatch) -> Float[Tensor, "batch points width"]:
+        """V_align of eq. (6)."""
+        x = self.visual(batch.features)
+        if self.language_alignment is None:
+            # BASE has no language of its own, so its scores could not depend on the instruction.
+            # Its points are weighted by their similarity, the product that A2 uses.
+            return x * _relevance(batch.similarity, batch.point_mask)[..., None]
+        gate = self.language_alignment.gate(
+            batch.features, batch.point_mask, batch.tokens, batch.token_mask, batch.pooled
+        )
+        x = self.language_alignment(x, gate)
+        if self.dssa_layers:
+            basis = position_basis(batch.positions, self.config.num_bias_scales)
+            for layer in self.dssa_layers:
+                x = layer(x, basis, batch.point_mask)
+        return x
+
+
+def _relevance(
+    similarity: Float[Tensor, "batch points"], mask: Bool[Tensor, "batch points"]
+) -> Float[Tensor, "batch points"]:
+    """Similarity shifted to a minimum of 0 and scaled to a mean of 1 over the real points.
+
+    CLIP's similarities lie within a tenth of one another; as they come, they would weight all
+    points alike.
+    """
+    lowest = similarity.masked_fill(~mask, float("inf")).amin(dim=-1, keepdim=True)
+    shifted = (similarity - lowest).masked_fill(~mask, 0.0)
+    mean = shifted.sum(dim=-1, keepdim=True) / mask.sum(dim=-1, keepdim=True).clamp(min=1)
+    return shifted / mean.clamp(min=1e-6)

@@ -1,0 +1,73 @@
+"""What a policy sees of the scene and the instruction."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from policy.arrays import check_range, checked_array
+from policy.errors import InvalidArrayError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observation:
+    """A cloud of semantic features and an instruction, as plain arrays.
+
+    Nothing here needs ground truth: all of it comes from camera images and text. Arrays are
+    copied, checked and made read-only.
+
+    Attributes:
+        points: (N, 3) float32 in the world, metres. N may be 0.
+        features: (N, C) float32 visual features in the text's space, unit rows.
+        similarity: (N,) float32 similarity of each point to the instruction.
+        confidence: (N,) float32, at least 0; how well the views agree on the point.
+        text_tokens: (T, C) float32 features of the instruction's tokens, padding left out.
+        text_pooled: (C,) float32 feature of the whole instruction.
+        workspace_min: (3,) float64 lower corner of the workspace in the world, metres.
+        workspace_max: (3,) float64 upper corner of the workspace in the world, metres.
+
+    Raises:
+        InvalidArrayError: If a field has a wrong shape or value, or the fields don't fit.
+    """
+
+    points: np.ndarray
+    features: np.ndarray
+    similarity: np.ndarray
+    confidence: np.ndarray
+    text_tokens: np.ndarray
+    text_pooled: np.ndarray
+    workspace_min: np.ndarray
+    workspace_max: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Check the fields and replace the arrays by read-only copies."""
+        sizes: dict[str, int] = {}
+        shapes: dict[str, tuple[int | str, ...]] = {
+            "points": ("N", 3),
+            "features": ("N", "C"),
+            "similarity": ("N",),
+            "confidence": ("N",),
+            "text_tokens": ("T", "C"),
+            "text_pooled": ("C",),
+        }
+        for name, shape in shapes.items():
+            array = checked_array(name, getattr(self, name), shape, sizes=sizes)
+            object.__setattr__(self, name, array)
+        for name in ("workspace_min", "workspace_max"):
+            corner = checked_array(name, getattr(self, name), (3,), dtype=np.float64)
+            object.__setattr__(self, name, corner)
+        check_range("confidence", self.confidence, 0.0)
+        if not (self.workspace_min < self.workspace_max).all():
+            raise InvalidArrayError(
+                f"workspace: got corners {self.workspace_min.tolist()} and "
+                f"{self.workspace_max.tolist()}, expected min < max on every axis."
+            )
+
+    @property
+    def num_points(self) -> int:
+        """Number N of points."""
+        return len(self.points)
+
+    @property
+    def feature_dim(self) -> int:
+        """Number C of feature channels."""
+        return self.features.shape[1]

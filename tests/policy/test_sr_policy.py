@@ -1,0 +1,121 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from policy.base import Policy
+from policy.errors import InvalidCheckpointError
+from policy.network.checkpoint import save_checkpoint
+from policy.registry import load_policy
+from policy.sr import SRPolicy
+
+
+@pytest.fixture
+def untrained(make_config) -> SRPolicy:
+    return SRPolicy.untrained(make_config(), np.random.default_rng(5))
+
+
+def test_is_a_policy(untrained: SRPolicy) -> None:
+    assert isinstance(untrained, Policy)
+    assert untrained.name == "sr"
+
+
+def test_scores_have_every_candidate(
+    untrained: SRPolicy, make_observation, make_candidates, rng: np.random.Generator
+) -> None:
+    scores = untrained.score(make_observation(rng, 200), make_candidates(rng, 11), rng)
+    assert scores.logits.shape == (11,) and scores.logits.dtype == np.float32
+    assert scores.probabilities.sum() == pytest.approx(1.0)
+    assert scores.decoding is not None
+    assert scores.decoding.rotvec_tool.shape == (11, 3)
+
+
+def test_no_candidates(
+    untrained: SRPolicy, make_observation, make_candidates, rng: np.random.Generator
+) -> None:
+    scores = untrained.score(make_observation(rng), make_candidates(rng, 0), rng)
+    assert len(scores) == 0
+    assert scores.decoding is not None and len(scores.decoding.opening_m) == 0
+
+
+def test_same_seed_same_bytes(
+    make_config, make_observation, make_candidates, rng: np.random.Generator
+) -> None:
+    observation, candidates = make_observation(rng, 150), make_candidates(rng)
+    state = torch.random.get_rng_state()
+    first, second, other = (
+        SRPolicy.untrained(make_config(), np.random.default_rng(seed))
+        .score(observation, candidates, np.random.default_rng(draw))
+        .logits.tobytes()
+        for draw, seed in enumerate((1, 1, 2))
+    )
+    assert first == second != other
+    assert torch.equal(torch.random.get_rng_state(), state)
+
+
+def test_checkpoint_round_trip(
+    untrained: SRPolicy,
+    tmp_path: Path,
+    make_observation,
+    make_candidates,
+    rng: np.random.Generator,
+) -> None:
+    path = tmp_path / "new" / "sr.safetensors"
+    save_checkpoint(path, untrained.network, {"epochs": 3})
+    loaded = load_policy("sr", checkpoint=path)
+    observation, candidates = make_observation(rng), make_candidates(rng)
+    expected = untrained.score(observation, candidates, rng).logits
+    np.testing.assert_array_equal(loaded.score(observation, candidates, rng).logits, expected)
+    card = json.loads(path.with_suffix(".json").read_text())
+    assert card["training"] == {"epochs": 3} and card["config"]["width"] == 32
+
+
+def test_unreadable_card(untrained: SRPolicy, tmp_path: Path) -> None:
+    path, card = tmp_path / "sr.safetensors", tmp_path / "sr.json"
+    save_checkpoint(path, untrained.network, {})
+    good = json.loads(card.read_text())
+    tail = "expected format, config and training. Save it again with save_checkpoint."
+    cases = [
+        (
+            json.dumps(good | {"format": 9}),
+            f"{card}: got format 9, expected 1. Save the weights again with this version.",
+        ),
+        (
+            json.dumps({"format": 1}),
+            f"{card}: got a card that can't be read (KeyError: 'config'), {tail}",
+        ),
+        (
+            json.dumps(good | {"config": good["config"] | {"width": 33}}),
+            f"{card}: got a card that can't be read (InvalidConfigError: width: got 33, expected "
+            f"a multiple of num_heads=4.), {tail}",
+        ),
+        (
+            "{",
+            f"{card}: got a card that can't be read (JSONDecodeError: Expecting property name "
+            f"enclosed in double quotes: line 1 column 2 (char 1)), {tail}",
+        ),
+    ]
+    for text, message in cases:
+        card.write_text(text)
+        with pytest.raises(InvalidCheckpointError) as caught:
+            load_policy("sr", checkpoint=path)
+        assert str(caught.value) == message
+
+
+def test_weights_that_do_not_fit(untrained: SRPolicy, tmp_path: Path) -> None:
+    path, card = tmp_path / "sr.safetensors", tmp_path / "sr.json"
+    save_checkpoint(path, untrained.network, {})
+    good = json.loads(card.read_text())
+    card.write_text(json.dumps(good | {"config": good["config"] | {"num_encoder_layers": 2}}))
+    with pytest.raises(InvalidCheckpointError) as caught:
+        load_policy("sr", checkpoint=path)
+    assert str(caught.value) == (
+        f"{path}: got weights that don't fit their card (Error(s) in loading state_dict for "
+        "SRNetwork:), expected those that sr.json describes. Save both again with save_checkpoint."
+    )
+    card.write_text(json.dumps(good))
+    path.write_bytes(b"not weights")
+    with pytest.raises(InvalidCheckpointError, match="weights that don't fit their card"):
+        load_policy("sr", checkpoint=path)
