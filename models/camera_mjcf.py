@@ -8,6 +8,7 @@ exactly the `fx, fy, cx, cy` of its `PinholeSensor`, and nobody downstream adds 
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 from dm_control import mjcf
 
@@ -24,10 +25,11 @@ def add_cameras(root: mjcf.RootElement, cameras: Sequence[CameraPlacement]) -> N
         root: The MJCF model to add to; its `visual.global` is changed as well.
         cameras: The cameras, for example `models.cameras.camera_preset("sr")`.
     """
+    worldbody: Any = root.worldbody  # dm_control makes its attributes at run time
     for camera in cameras:
         R_world_cam_cv = camera.R_world_cam_cv()
         right, down = R_world_cam_cv[:, 0], R_world_cam_cv[:, 1]
-        root.worldbody.add(
+        worldbody.add(
             "camera",
             name=camera.name,
             pos=camera.position,

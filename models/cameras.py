@@ -67,7 +67,7 @@ class CameraPlacement:
     sensor: PinholeSensor = L515
 
     def R_world_cam_cv(self) -> np.ndarray:
-        """Return the (3, 3) rotation from OpenCV camera axes (right, down, forward) to the world."""
+        """Return the (3, 3) rotation from OpenCV axes (right, down, forward) to the world."""
         forward = np.subtract(self.target, self.position).astype(float)
         forward /= np.linalg.norm(forward)
         right = np.cross(forward, self.up)
@@ -89,9 +89,7 @@ _TOP_UP = (1.0, 0.0, 0.0)
 CAMERA_PRESETS: dict[str, tuple[CameraPlacement, ...]] = {
     # Side cameras at opposite corners: they see into the gaps that the other one cannot.
     "sr": (
-        CameraPlacement(
-            name="top", position=(0.5, 0.0, 0.75), target=WORKSPACE_CENTER, up=_TOP_UP
-        ),
+        CameraPlacement(name="top", position=(0.5, 0.0, 0.75), target=WORKSPACE_CENTER, up=_TOP_UP),
         CameraPlacement(name="left", position=(0.2, 0.35, 0.5), target=_SIDE_TARGET),
         CameraPlacement(name="right", position=(0.8, -0.35, 0.5), target=_SIDE_TARGET),
     ),
@@ -102,6 +100,16 @@ CAMERA_PRESETS: dict[str, tuple[CameraPlacement, ...]] = {
         CameraPlacement(name="right", position=(0.2, -0.35, 0.5), target=_SIDE_TARGET),
     ),
 }
+
+
+VIDEO = PinholeSensor(
+    width=960, height=720, fx=900.0, fy=900.0, cx=480.0, cy=360.0, range_m=(0.25, 9.0)
+)
+
+# Not a sensor: the spectator's view, for videos and pictures.
+OVERVIEW = CameraPlacement(
+    name="overview", position=(1.25, 0.80, 0.85), target=(0.33, -0.10, 0.10), sensor=VIDEO
+)
 
 
 def camera_preset(name: str) -> tuple[CameraPlacement, ...]:
