@@ -53,7 +53,9 @@ def _add_defaults(root: mjcf.RootElement) -> None:
     body = root.default.add("default", dclass="body")
     body.geom.set_attributes(type="box", rgba=_BLACK, group=2, mass=0)
     finger = root.default.add("default", dclass="finger")
-    finger.geom.set_attributes(type="box", rgba=_BLACK, group=2, condim=3, friction=(0.4, 0.005, 0.0001))
+    finger.geom.set_attributes(
+        type="box", rgba=_BLACK, group=2, condim=3, friction=(0.4, 0.005, 0.0001)
+    )
     # Rubber: friction 1 wins over the object's (priority), with torsional friction so that an
     # object held off its centre does not swing; contacts as stiff as the time step allows.
     pad = root.default.add("default", dclass="pad")
@@ -112,5 +114,5 @@ def build_gripper(geometry: GripperGeometry = ROBOTIQ_2F85_CLASS) -> mjcf.RootEl
 
 
 def finger_travel(width_m: float, geometry: GripperGeometry = ROBOTIQ_2F85_CLASS) -> float:
-    """Return the actuator command in metres that opens the pads to `width_m`, clipped to the stroke."""
+    """Return the actuator command (m) that opens the pads to `width_m`, within the stroke."""
     return float(np.clip(width_m, 0, geometry.max_width_m)) / 2

@@ -2,9 +2,9 @@
 
 The figures follow the public data sheet of the Robotiq 2F-85 (stroke 85 mm, fingertip pad 22 mm
 wide, overall length about 163 mm with the fingers closed, grip force 20 to 235 N, mass 0.9 kg;
-https://robotiq.com/products/2f85-140-adaptive-robot-gripper, "Specifications"). The real fingers move on a
-four-bar linkage; ours slide in parallel, which keeps the pads parallel as the real linkage does
-over its main stroke and needs no closed kinematic chain.
+https://robotiq.com/products/2f85-140-adaptive-robot-gripper, "Specifications"). The real fingers
+move on a four-bar linkage; ours slide in parallel, which keeps the pads parallel as the real
+linkage does over its main stroke and needs no closed kinematic chain.
 """
 
 from dataclasses import dataclass

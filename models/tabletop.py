@@ -3,49 +3,8 @@
 The table's surface is the plane z = 0; the robot's base stands on it at the origin.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from dm_control import mjcf
-
-
-@dataclass(frozen=True, kw_only=True)
-class Workspace:
-    """An axis-aligned box above the table, metres in world coordinates.
-
-    Attributes:
-        lower: Smallest x, y, z.
-        upper: Largest x, y, z.
-    """
-
-    lower: tuple[float, float, float]
-    upper: tuple[float, float, float]
-
-    @property
-    def center(self) -> np.ndarray:
-        """Return the centre (3,)."""
-        return (np.array(self.lower) + np.array(self.upper)) / 2
-
-    @property
-    def diagonal_m(self) -> float:
-        """Return the length of the box's diagonal in metres."""
-        return float(np.linalg.norm(np.subtract(self.upper, self.lower)))
-
-    def contains_xy(self, points: np.ndarray) -> np.ndarray:
-        """Tell which points lie inside, seen from above.
-
-        Args:
-            points: (..., 2) or (..., 3), metres.
-
-        Returns:
-            (...) bool.
-        """
-        xy = np.asarray(points)[..., :2]
-        return np.all((xy >= self.lower[:2]) & (xy <= self.upper[:2]), axis=-1)
-
-
-GRASP_WORKSPACE = Workspace(lower=(0.276, -0.224, 0.0), upper=(0.724, 0.224, 0.4))
-PICK_PLACE_WORKSPACE = Workspace(lower=(0.164, -0.336, 0.0), upper=(0.836, 0.336, 0.4))
 
 TABLE_GEOM = "table"
 BIN_CENTER = (0.15, -0.58, 0.0)
@@ -55,12 +14,12 @@ BIN_HEIGHT_M = 0.10
 
 _TABLE_CENTER, _TABLE_HALF = (0.4, 0.0), (0.7, 0.85)
 _TABLE_THICKNESS = 0.04
-_WOOD = (0.80, 0.76, 0.70, 1.0)
+_WOOD = (0.74, 0.70, 0.65, 1.0)
 _BIN_BLUE = (0.30, 0.42, 0.58, 1.0)
 
 
 def set_physics_options(root: mjcf.RootElement) -> None:
-    """Set time step, solver and contact options; docs/physics.md has the measurements behind them."""
+    """Set time step, solver and contact options; docs/physics.md has the measurements."""
     root.option.timestep = 0.002
     root.option.integrator = "implicitfast"
     root.option.cone = "elliptic"
@@ -71,7 +30,9 @@ def set_physics_options(root: mjcf.RootElement) -> None:
 
 
 def _add_visuals(root: mjcf.RootElement) -> None:
-    root.visual.headlight.set_attributes(ambient=(0.35,) * 3, diffuse=(0.25,) * 3, specular=(0,) * 3)
+    root.visual.headlight.set_attributes(
+        ambient=(0.35,) * 3, diffuse=(0.18,) * 3, specular=(0,) * 3
+    )
     root.asset.add(
         "texture", name="sky", type="skybox", builtin="gradient",
         rgb1=(0.75, 0.80, 0.86), rgb2=(0.42, 0.46, 0.52), width=64, height=64,
@@ -84,7 +45,7 @@ def _add_visuals(root: mjcf.RootElement) -> None:
             pos=pos,
             dir=np.subtract((0.5, 0, 0), pos),
             type="directional",
-            diffuse=(0.35,) * 3,
+            diffuse=(0.30,) * 3,
             specular=(0.1,) * 3,
             castshadow=False,
         )

@@ -184,7 +184,7 @@ def build_ur5() -> mjcf.RootElement:
             name=link.joint.removesuffix("_joint"),
             joint=joint,
             kp=link.kp,
-            dampratio=1,
+            dampratio=1.6,  # above 1: neighbouring links move, and count, as well
             ctrlrange=link.joint_range,
             forcerange=(-link.effort, link.effort),
         )

@@ -11,7 +11,7 @@ from models.gripper_geometry import ROBOTIQ_2F85_CLASS
 from models.objects.asset import ObjectAsset
 from models.objects.catalogue import load_object, object_names
 from models.objects.words import ObjectWords
-from models.tabletop import Workspace
+from models.workspace import Workspace
 from sr_mj.errors import SceneError
 from sr_mj.scene.compose import OBJECT_BODY, ComposedScene, compose_scene, home_state
 from sr_mj.scene.config import SceneConfig, SceneKind

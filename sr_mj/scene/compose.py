@@ -8,7 +8,7 @@ import numpy as np
 from dm_control import mjcf
 
 from models.camera_mjcf import add_cameras
-from models.cameras import camera_preset
+from models.cameras import OVERVIEW, camera_preset
 from models.objects.asset import ObjectAsset
 from models.objects.mjcf_builder import build_object
 from models.robot import ARM_ACTUATORS, ARM_JOINTS, attach_robot
@@ -75,7 +75,7 @@ def compose_scene(
     """
     root = build_tabletop(model_name)
     attach_robot(root)
-    add_cameras(root, camera_preset(cameras))
+    add_cameras(root, (*camera_preset(cameras), OVERVIEW))
     for asset in assets:
         frame = root.attach(build_object(asset, name=asset.name))
         frame.add("freejoint")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from models.tabletop import GRASP_WORKSPACE, PICK_PLACE_WORKSPACE, Workspace
+from models.workspace import GRASP_WORKSPACE, PICK_PLACE_WORKSPACE, Workspace
 from sr_mj.errors import ConfigError, UnknownNameError, unknown_name_message
 
 Split = Literal["seen", "unseen"]

@@ -118,7 +118,7 @@ def find_targets(text: str, objects: dict[str, ObjectWords]) -> tuple[str, ...]:
     Returns:
         Names of the targets, in the scene's order; empty if nothing fits.
     """
-    phrase = parse_instruction(text).target.lower()
+    phrase = parse_instruction(text).target_phrase
     if not _EMPTY_NOUN.search(phrase):
         named = _named_targets(phrase, objects)
         if named:

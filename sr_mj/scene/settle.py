@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.tabletop import Workspace
+from models.workspace import Workspace
 from sr_mj.errors import SceneError
 
 DROP_HEIGHT_M = 0.2

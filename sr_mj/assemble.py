@@ -1,0 +1,99 @@
+"""Puts the stages together by name, for one scene."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from models.cameras import camera_preset
+from perception.encoders import load_encoder
+from perception.fusion import FusionConfig
+from perception.lifter import LifterConfig, MultiViewLifter
+from policy.base import Policy
+from policy.registry import POLICY_NAMES, load_policy
+from sr_mj.candidates.antipodal import AntipodalSampler
+from sr_mj.episode import Pipeline
+from sr_mj.errors import UnknownNameError, unknown_name_message
+from sr_mj.execution import Executor, StepHook
+from sr_mj.oracle import OraclePolicy
+from sr_mj.planning import Planner
+from sr_mj.scene import Scene
+from sr_mj.sensors.l515 import L515NoiseConfig
+from sr_mj.sensors.renderer import CameraRig
+
+ALL_POLICIES = (*POLICY_NAMES, OraclePolicy.name)
+
+
+def make_policy(name: str, scene: Scene, checkpoint: Path | None = None) -> Policy:
+    """Make a policy by name; `oracle` is the one that may read the scene.
+
+    Args:
+        name: One of `ALL_POLICIES`.
+        scene: The scene that will be acted in.
+        checkpoint: Weights for a learnt policy; those shipped when None.
+
+    Returns:
+        The policy.
+
+    Raises:
+        UnknownNameError: If there is no such policy.
+        PolicyError: If its weights are missing.
+    """
+    if name not in ALL_POLICIES:
+        raise UnknownNameError(
+            unknown_name_message("policy", name, ALL_POLICIES).replace("Policys", "Policies")
+        )
+    if name == OraclePolicy.name:
+        return OraclePolicy(scene)
+    return load_policy(name, checkpoint=checkpoint)
+
+
+def lifter_for(scene: Scene, encoder: str, *, allow_download: bool = False) -> MultiViewLifter:
+    """Make the perception stage for a scene's workspace.
+
+    Args:
+        scene: The scene.
+        encoder: Name of the encoder; see `perception.encoders.load_encoder`.
+        allow_download: Whether missing weights may be fetched from the hub.
+
+    Returns:
+        The lifter.
+    """
+    x, y, z = scene.workspace.lower
+    # A little under the table, so that the noise of the table's own points is not cut in half.
+    fusion = FusionConfig(workspace_min=(x, y, z - 0.01), workspace_max=scene.workspace.upper)
+    return MultiViewLifter(
+        load_encoder(encoder, allow_download=allow_download), LifterConfig(fusion=fusion)
+    )
+
+
+@contextmanager
+def assembled(
+    scene: Scene,
+    *,
+    lifter: MultiViewLifter,
+    policy: Policy,
+    planner: Planner | None = None,
+    on_step: StepHook | None = None,
+) -> Iterator[Pipeline]:
+    """Assemble the stages for a scene; the renderer is freed at the end.
+
+    Args:
+        scene: The scene.
+        lifter: Perception stage.
+        policy: Policy.
+        planner: Planner; a new one when None.
+        on_step: Called after every simulation step.
+
+    Yields:
+        The pipeline.
+    """
+    with CameraRig(scene.model, camera_preset(scene.config.cameras)) as rig:
+        yield Pipeline(
+            rig=rig,
+            noise=L515NoiseConfig(),
+            lifter=lifter,
+            generator=AntipodalSampler(),
+            policy=policy,
+            planner=planner or Planner(),
+            executor=Executor(scene, on_step=on_step),
+        )

@@ -1,0 +1,41 @@
+"""What every command line shares: configuration from arguments, errors in one line."""
+
+import sys
+import warnings
+from collections.abc import Callable
+from typing import TypeVar
+
+import tyro
+
+Config = TypeVar("Config")
+
+USAGE_ERROR = 2
+
+
+def run_command(config_type: type[Config], body: Callable[[Config], int], description: str) -> None:
+    """Parse the arguments, run the command, and exit with its status.
+
+    Mistakes that a user can make end in one line on stderr and status 2, without a traceback.
+
+    Args:
+        config_type: Frozen dataclass whose fields become options.
+        body: The command; imports what is heavy itself, so that `--help` answers at once.
+        description: Text of `--help`.
+    """
+    config = tyro.cli(config_type, description=description)
+    # GLFW warns about a missing display on import, on every headless machine.
+    warnings.filterwarnings("ignore", message=".*DISPLAY.*")
+    from models.errors import ModelsError
+    from perception.errors import PerceptionError
+    from policy.errors import PolicyError
+    from sr_mj.errors import SrMjError
+
+    try:
+        status = body(config)
+    except (SrMjError, ModelsError, PerceptionError, PolicyError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        status = USAGE_ERROR
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        status = 130
+    sys.exit(status)

@@ -1,0 +1,4 @@
+# A compiled module without types.
+from typing import Any
+
+def __getattr__(name: str) -> Any: ...
