@@ -1,0 +1,127 @@
+"""What every encoder offers: dense image features and text features in one space."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import torch
+
+from perception.arrays import checked_array
+from perception.errors import InvalidCloudError, InvalidTextError, InvalidViewError
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TextFeatures:
+    """Features of one text.
+
+    Attributes:
+        pooled: (C,) float32, unit length; what image features are compared with.
+        tokens: (T, C) float32, one row for each valid token (no padding), as the text tower ends.
+    """
+
+    pooled: np.ndarray
+    tokens: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Check the arrays and make them read-only."""
+        spec = {"owner": "TextFeatures", "dtype": np.float32, "error": InvalidCloudError}
+        pooled = checked_array(name="pooled", value=self.pooled, shape=("C",), **spec)
+        tokens = checked_array(
+            name="tokens", value=self.tokens, shape=("T", pooled.shape[0]), **spec
+        )
+        object.__setattr__(self, "pooled", pooled)
+        object.__setattr__(self, "tokens", tokens)
+
+
+@runtime_checkable
+class Encoder(Protocol):
+    """A pair of image and text towers that share a feature space of C dimensions."""
+
+    @property
+    def name(self) -> str:
+        """Name under which `perception.encoders.load_encoder` finds the encoder."""
+        ...
+
+    @property
+    def fingerprint(self) -> str:
+        """A short text that changes whenever the same image could give other features."""
+        ...
+
+    @property
+    def feature_dim(self) -> int:
+        """C, the dimension of the shared feature space."""
+        ...
+
+    def encode_dense(self, images: Sequence[np.ndarray]) -> torch.Tensor:
+        """Encode images into feature maps in text space.
+
+        The h x w cells of a map divide the image evenly: the centre of cell (i, j) lies at pixel
+        ((j + 0.5) W / w - 0.5, (i + 0.5) H / h - 0.5), pixel centres at integers.
+
+        Args:
+            images: V images, each (H, W, 3) uint8 RGB, all of one size.
+
+        Returns:
+            (V, C, h, w) float32, each cell of unit length.
+        """
+        ...
+
+    def encode_text(self, text: str) -> TextFeatures:
+        """Encode one text.
+
+        Args:
+            text: Any text with at least one word.
+
+        Returns:
+            Its features.
+        """
+        ...
+
+
+def stacked_images(images: Sequence[np.ndarray]) -> np.ndarray:
+    """Check images of one size and stack them.
+
+    Args:
+        images: V >= 1 images, each (H, W, 3) uint8.
+
+    Returns:
+        (V, H, W, 3) uint8.
+
+    Raises:
+        InvalidViewError: If there is none, one is no RGB image, or the sizes differ.
+    """
+    if len(images) == 0:
+        raise InvalidViewError("No image to encode: expected at least one (H, W, 3) uint8 image.")
+    height, width = images[0].shape[:2] if images[0].ndim == 3 else ("H", "W")
+    return np.stack(
+        [
+            checked_array(
+                f"image {index}",
+                "rgb",
+                image,
+                shape=(height, width, 3),
+                dtype=np.uint8,
+                error=InvalidViewError,
+            )
+            for index, image in enumerate(images)
+        ]
+    )
+
+
+def checked_text(text: str) -> str:
+    """Return the text without surrounding white space.
+
+    Args:
+        text: What is to be encoded.
+
+    Returns:
+        The stripped text.
+
+    Raises:
+        InvalidTextError: If nothing is left.
+    """
+    stripped = text.strip()
+    if not stripped:
+        raise InvalidTextError(f"Empty text {text!r}: expected at least one word.")
+    return stripped

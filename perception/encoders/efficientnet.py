@@ -1,0 +1,88 @@
+"""EfficientNet-Lite0 as a dense feature extractor: output stride 16, folded batch norm.
+
+open_clip builds the image tower through timm by name and cannot pass an output stride, therefore
+the wrapper `perception_efficientnet_lite0` is registered with timm here.
+"""
+
+from typing import Any, cast
+
+import timm
+import torch.nn.functional as F
+from timm.layers import BatchNormAct2d
+from timm.models import EfficientNet, register_model
+from torch import Tensor, nn
+from torch.nn.utils.fusion import fuse_conv_bn_eval
+
+TRUNK_NAME = "perception_efficientnet_lite0"
+OUTPUT_STRIDE = 16
+
+# With these weights and output stride 16, a cell looks about 6 pixels to the left of its middle,
+# and above it: TensorFlow's "same" padding centres output j of a stride-2 convolution on input
+# 2j + 1, and the trained kernels lean the other way, also in the stage whose stride is removed
+# here. Found by comparing the maps of pictures with those of their mirror images.
+_ALIGNMENT_PX = 6
+
+# Where a block of timm's EfficientNet keeps each convolution and the batch norm behind it.
+_CONV_BN_PAIRS = {
+    "DepthwiseSeparableConv": (("conv_dw", "bn1"), ("conv_pw", "bn2")),
+    "InvertedResidual": (("conv_pw", "bn1"), ("conv_dw", "bn2"), ("conv_pwl", "bn3")),
+    "EfficientNet": (("conv_stem", "bn1"), ("conv_head", "bn2")),
+}
+
+
+@register_model
+def perception_efficientnet_lite0(pretrained: bool = False, **kwargs: Any) -> nn.Module:
+    """Create timm's `tf_efficientnet_lite0` with output stride 16 instead of 32.
+
+    The weights stay the same: the last stage keeps its resolution and dilates its kernels.
+
+    Args:
+        pretrained: Ignored; weights are always loaded from a file.
+        **kwargs: Passed to timm.
+
+    Returns:
+        The network, randomly initialised.
+    """
+    del pretrained
+    return timm.create_model(
+        "tf_efficientnet_lite0", pretrained=False, output_stride=OUTPUT_STRIDE, **kwargs
+    )
+
+
+def fold_batch_norm(trunk: EfficientNet) -> EfficientNet:
+    """Fold every batch norm into the convolution before it, in place; the function is unchanged.
+
+    Args:
+        trunk: An EfficientNet of timm in evaluation mode.
+
+    Returns:
+        The same network, whose batch norms have become their activations.
+    """
+    for module in list(trunk.modules()):
+        for conv_name, norm_name in _CONV_BN_PAIRS.get(type(module).__name__, ()):
+            conv, norm = module.get_submodule(conv_name), module.get_submodule(norm_name)
+            assert isinstance(conv, nn.Conv2d) and isinstance(norm, BatchNormAct2d)
+            plain = nn.BatchNorm2d(conv.out_channels, eps=cast(float, norm.eps)).eval()
+            plain.load_state_dict(norm.state_dict())
+            setattr(module, conv_name, fuse_conv_bn_eval(conv, plain))
+            setattr(module, norm_name, norm.act)
+    return trunk
+
+
+def to_network_input(images: Tensor, size: tuple[int, int]) -> Tensor:
+    """Resize, normalise and align images for `dense_features`.
+
+    Args:
+        images: (V, 3, H, W) uint8.
+        size: Height and width to resize to, both multiples of 32.
+
+    Returns:
+        (V, 3, height, width) float32 in -1..1, moved by a few pixels so that what a cell looks at
+        lies in its middle.
+    """
+    resized = F.interpolate(
+        images.float(), size=size, mode="bilinear", antialias=True, align_corners=False
+    )
+    shift = _ALIGNMENT_PX
+    aligned = F.pad(resized, (0, shift, 0, shift), mode="replicate")[..., shift:, shift:]
+    return aligned.div_(127.5).sub_(1.0)  # mean 0.5 and deviation 0.5, as the network was trained

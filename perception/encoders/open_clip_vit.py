@@ -1,0 +1,300 @@
+"""CLIP vision transformers as dense encoders (section 3.2.1: multi-scale patch features).
+
+CLIP is trained to describe whole images. What its patches show is kept best by the value path of
+the last attention block (MaskCLIP, Zhou et al. 2022): value and output projection without the
+mixing over patches, then the final layer norm and the projection into text space.
+"""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import open_clip
+import torch
+import torch.nn.functional as F
+from open_clip.factory import load_state_dict
+from open_clip.model import CLIP, resize_pos_embed
+from open_clip.transformer import ResidualAttentionBlock, VisionTransformer
+from safetensors import SafetensorError
+from torch import Tensor, nn
+
+from perception.encoders.base import TextFeatures, checked_text, stacked_images
+from perception.encoders.clip_weights import RGB, ClipWeights, is_torchscript
+from perception.errors import InvalidConfigError, InvalidWeightsError
+
+
+@dataclass(frozen=True, kw_only=True)
+class VitConfig:
+    """Settings of the dense encoding.
+
+    Attributes:
+        num_tiles: Tiles along each side of the image, besides the whole image; 0 = whole image
+            only.
+        tile_overlap: Share of a tile's length that its neighbour sees too, 0..0.9.
+    """
+
+    num_tiles: int = 2
+    tile_overlap: float = 1 / 3
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        if self.num_tiles < 0 or not 0 <= self.tile_overlap <= 0.9:
+            raise InvalidConfigError(
+                f"num_tiles is {self.num_tiles} and tile_overlap {self.tile_overlap}, expected 0 "
+                "or more and 0..0.9."
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Window:
+    """A part of an image in relative coordinates, 0..1 along each axis."""
+
+    top: float
+    left: float
+    size: float
+
+
+class OpenClipVitEncoder:
+    """A CLIP model of open_clip, with a vision transformer, behind the `Encoder` protocol."""
+
+    def __init__(
+        self,
+        model: CLIP,
+        *,
+        architecture: str,
+        source: str,
+        mean: RGB,
+        std: RGB,
+        config: VitConfig | None = None,
+    ) -> None:
+        """Wrap a loaded model.
+
+        Args:
+            model: An `open_clip.CLIP` whose image tower is a plain vision transformer.
+            architecture: Name of its configuration in open_clip; chooses the tokenizer.
+            source: Where its weights come from.
+            mean: RGB mean for normalisation.
+            std: RGB deviation for normalisation.
+            config: Settings; the defaults if None.
+        """
+        self.config = config or VitConfig()
+        self.name = f"{architecture}:{source}"
+        self._model = model.eval().requires_grad_(False)
+        self._visual = cast(VisionTransformer, model.visual)
+        self._blocks = cast(list[ResidualAttentionBlock], list(self._visual.transformer.resblocks))
+        self._projection = cast(Tensor, self._visual.proj)
+        self._tokenizer = open_clip.get_tokenizer(architecture)
+        self._mean = torch.tensor(mean).view(3, 1, 1) * 255.0
+        self._std = torch.tensor(std).view(3, 1, 1) * 255.0
+        self.feature_dim = int(self._visual.output_dim)
+        self.fingerprint = _fingerprint(
+            self.name, (self._visual.conv1.weight, self._projection), self.config
+        )
+
+    @classmethod
+    def from_weights(
+        cls, weights: ClipWeights, config: VitConfig | None = None
+    ) -> "OpenClipVitEncoder":
+        """Build a model and load its weights.
+
+        Args:
+            weights: What to load.
+            config: Settings; the defaults if None.
+
+        Returns:
+            The encoder.
+
+        Raises:
+            InvalidWeightsError: If the file does not fit the architecture.
+        """
+        # open_clip only warns where configuration and weights disagree about GELU.
+        model = cast(
+            CLIP,
+            open_clip.create_model(
+                weights.architecture,
+                load_weights=False,
+                force_quick_gelu=weights.is_quick_gelu,
+            ),
+        )
+        try:
+            model.load_state_dict(_read_state(weights, model))
+        except (RuntimeError, OSError, SafetensorError, KeyError) as error:
+            raise InvalidWeightsError(
+                f"{weights.path} does not hold weights of {weights.architecture} "
+                f"({str(error).splitlines()[0]}); check the file, or name its architecture."
+            ) from error
+        return cls(
+            model,
+            architecture=weights.architecture,
+            source=weights.source,
+            mean=weights.mean,
+            std=weights.std,
+            config=config,
+        )
+
+    @torch.no_grad()
+    def encode_dense(self, images: Sequence[np.ndarray]) -> Tensor:
+        """Encode images into feature maps in text space; see `Encoder.encode_dense`.
+
+        Args:
+            images: V images, each (H, W, 3) uint8 RGB, all of one size.
+
+        Returns:
+            (V, C, h, w) float32, each cell of unit length; h and w are the patches of all tiles
+            together.
+        """
+        pixels = torch.from_numpy(stacked_images(images)).permute(0, 3, 1, 2).float()
+        pixels = (pixels - self._mean) / self._std
+        windows = list(_windows(self.config))
+        grid = self._patch_grid(*pixels.shape[-2:])
+        smallest = min(window.size for window in windows)
+        h, w = round(grid[0] / smallest), round(grid[1] / smallest)
+        total = torch.zeros(len(pixels), self.feature_dim, h, w)
+        for window in windows:
+            features = self.value_features(self._network_input(pixels, window, grid), grid)
+            _blend(total, features, window)
+        return F.normalize(total, dim=1)
+
+    @torch.no_grad()
+    def encode_text(self, text: str) -> TextFeatures:
+        """Encode one text with CLIP's text tower; see `Encoder.encode_text`.
+
+        Args:
+            text: Any text with at least one word; beyond 77 tokens it is cut.
+
+        Returns:
+            Its features; tokens reach from the start token to the end token, and are projected into
+            the text space like the pooled one.
+
+        Raises:
+            InvalidTextError: If the text is empty.
+        """
+        ids = self._tokenizer([checked_text(text)])
+        end = int(ids[0].argmax())  # the end token has the highest number of all
+        model = self._model
+        x = model.get_submodule("token_embedding")(ids) + model.positional_embedding
+        x = model.get_submodule("transformer")(x, attn_mask=model.attn_mask)
+        x = model.get_submodule("ln_final")(x)
+        projected = (x @ cast(Tensor, model.text_projection))[0]
+        return TextFeatures(
+            pooled=F.normalize(projected[end], dim=0).numpy(),
+            tokens=projected[: end + 1].numpy(),
+        )
+
+    def value_features(self, pixels: Tensor, grid: tuple[int, int]) -> Tensor:
+        """Compute patch features in text space by the value path of the last block.
+
+        Args:
+            pixels: (B, 3, h * patch, w * patch) normalised pixels.
+            grid: h and w, in patches; not necessarily those of the training.
+
+        Returns:
+            (B, C, h, w) float32, each cell of unit length.
+        """
+        visual = self._visual
+        x = visual.conv1(pixels).flatten(2).transpose(1, 2)
+        token = visual.class_embedding.expand(len(x), 1, -1)
+        x = torch.cat([token, x], dim=1) + self._position_embedding(grid)
+        *blocks, last = self._blocks
+        x = visual.get_submodule("ln_pre")(x)
+        for block in blocks:
+            x = block(x)
+        x = last.ln_1(x[:, 1:])
+        # MultiheadAttention stacks the input projections of queries, keys and values.
+        weight, bias = last.attn.in_proj_weight.chunk(3)[2], last.attn.in_proj_bias.chunk(3)[2]
+        values = last.attn.out_proj(F.linear(x, weight, bias))
+        features = F.normalize(visual.ln_post(values) @ self._projection, dim=-1)
+        return features.transpose(1, 2).unflatten(2, grid)
+
+    def _patch_grid(self, height: int, width: int) -> tuple[int, int]:
+        """Return the patches of one pass: the trained number on the short side, aspect kept."""
+        short = min(self._visual.grid_size)
+        scale = short / min(height, width)
+        return max(1, round(height * scale)), max(1, round(width * scale))
+
+    def _position_embedding(self, grid: tuple[int, int]) -> Tensor:
+        embedding = self._visual.positional_embedding
+        if grid == tuple(self._visual.grid_size):
+            return embedding
+        patches = embedding[1:].T.reshape(1, -1, *self._visual.grid_size)
+        resized = F.interpolate(
+            patches, size=grid, mode="bicubic", antialias=True, align_corners=False
+        )
+        return torch.cat([embedding[:1], resized.flatten(2)[0].T])
+
+    def _network_input(self, pixels: Tensor, window: _Window, grid: tuple[int, int]) -> Tensor:
+        height, width = pixels.shape[-2:]
+        top, left = round(window.top * height), round(window.left * width)
+        bottom = round((window.top + window.size) * height)
+        right = round((window.left + window.size) * width)
+        patch_height, patch_width = self._visual.patch_size
+        return F.interpolate(
+            pixels[..., top:bottom, left:right],
+            size=(grid[0] * patch_height, grid[1] * patch_width),
+            mode="bicubic",
+            antialias=True,
+            align_corners=False,
+        )
+
+
+def _windows(config: VitConfig) -> Iterator[_Window]:
+    """Yield the whole image, then the tiles, evenly spread."""
+    yield _Window(top=0.0, left=0.0, size=1.0)
+    n = config.num_tiles
+    if n < 2:
+        return
+    size = 1.0 / (n - (n - 1) * config.tile_overlap)
+    step = (1.0 - size) / (n - 1)
+    for i in range(n):
+        for j in range(n):
+            yield _Window(top=i * step, left=j * step, size=size)
+
+
+def _blend(total: Tensor, features: Tensor, window: _Window) -> None:
+    """Add a window's features to the map of the whole image, in place.
+
+    A tile's weight falls towards its rim, where patches lack context, and so hides its seams.
+    """
+    ys = _window_coordinates(total.shape[2], window.top, window.size)
+    xs = _window_coordinates(total.shape[3], window.left, window.size)
+    where = torch.stack(torch.meshgrid(xs, ys, indexing="xy"), dim=-1)
+    sampled = F.grid_sample(
+        features,
+        where.expand(len(features), -1, -1, -1),
+        mode="bilinear",
+        padding_mode="border",
+        align_corners=False,
+    )
+    weight = torch.ones(len(ys), len(xs))
+    if window.size < 1.0:
+        tents = [(1.0 - c.abs()).clamp(min=0.0) for c in (ys, xs)]
+        weight = tents[0][:, None] * tents[1]
+    total += weight * sampled
+
+
+def _window_coordinates(num_cells: int, start: float, size: float) -> Tensor:
+    """Return the centres of a map's cells in a window's coordinates, -1..1 inside of it."""
+    centers = (torch.arange(num_cells) + 0.5) / num_cells
+    return (centers - start) / size * 2.0 - 1.0
+
+
+def _read_state(weights: ClipWeights, model: nn.Module) -> dict[str, Tensor]:
+    if is_torchscript(weights.path):
+        archive = cast(nn.Module, torch.jit.load(weights.path, map_location="cpu"))
+        state: dict[str, Tensor] = dict(archive.state_dict())
+        for name in ("input_resolution", "context_length", "vocab_size"):
+            state.pop(name, None)
+    else:
+        state = cast(dict[str, Tensor], load_state_dict(str(weights.path)))
+    resize_pos_embed(state, model)
+    return {name: tensor.float() for name, tensor in state.items()}
+
+
+def _fingerprint(name: str, tensors: Sequence[Tensor], config: VitConfig) -> str:
+    # The first and last weights stand for all: hashing a gigabyte would take seconds.
+    digest = hashlib.sha256(f"{name}|{config}".encode())
+    for tensor in tensors:
+        digest.update(tensor.detach().float().numpy().tobytes())
+    return f"{name}-{digest.hexdigest()[:16]}"

@@ -1,0 +1,169 @@
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+
+from perception.encoders.base import TextFeatures
+from perception.errors import EmptyCloudError, InvalidConfigError, InvalidTextError
+from perception.fusion import FusionConfig
+from perception.lifter import LifterConfig, MultiViewLifter
+from perception.similarity import relevancy
+from perception.views import CameraView
+
+WORDS = {"red": 0, "green": 1, "blue": 2}
+
+
+class ColorEncoder:
+    """Text space = RGB: cells hold the mean colour, words the colour they name."""
+
+    name = "color"
+    fingerprint = "color-1"
+    feature_dim = 3
+
+    def __init__(self) -> None:
+        self.num_images = 0
+        self.texts: list[str] = []
+
+    def encode_dense(self, images: Sequence[np.ndarray]) -> torch.Tensor:
+        self.num_images += len(images)
+        pixels = torch.from_numpy(np.stack(images)).permute(0, 3, 1, 2).float() + 1.0
+        return F.normalize(F.avg_pool2d(pixels, 4), dim=1)
+
+    def encode_text(self, text: str) -> TextFeatures:
+        self.texts.append(text)
+        pooled = np.full(3, 1e-3, np.float32)
+        for word, channel in WORDS.items():
+            pooled[channel] += word in text.split()
+        pooled /= np.linalg.norm(pooled)
+        return TextFeatures(pooled=pooled, tokens=np.tile(pooled, (len(text.split()), 1)))
+
+
+@pytest.fixture
+def lifter() -> MultiViewLifter:
+    return MultiViewLifter(ColorEncoder())
+
+
+def test_the_named_object_is_found(
+    lifter: MultiViewLifter, table_views: tuple[CameraView, ...]
+) -> None:
+    centers = {"red": (0.5, 0.08), "green": (0.44, -0.09), "blue": (0.6, -0.05)}
+    for word, center in centers.items():
+        percept = lifter.perceive(table_views, f"give me the {word} object")
+        assert percept.target_phrase == f"{word} object"
+        cloud = percept.features
+        best = cloud.points[np.argsort(cloud.similarity)[-50:]]
+        assert np.linalg.norm(best[:, :2] - center, axis=1).max() < 0.06
+        assert cloud.similarity.min() >= 0 and cloud.similarity.max() <= 1
+
+
+def test_clouds_fit_together(lifter: MultiViewLifter, table_views: tuple[CameraView, ...]) -> None:
+    percept = lifter.perceive(table_views, "give me the red object")
+    assert len(percept.geometry) > 10 * len(percept.features) > 1000
+    assert (percept.features.confidence > 0).all() and (percept.features.confidence <= 1).all()
+    assert percept.features.points[:, 2].min() > 0.003  # the table is not lifted by default
+    assert percept.geometry.points[:, 2].min() < 0.001  # but it is in the geometry
+
+
+def test_table_is_lifted_on_demand(table_views: tuple[CameraView, ...]) -> None:
+    lifter = MultiViewLifter(ColorEncoder(), LifterConfig(is_table_lifted=True))
+    points = lifter.perceive(table_views, "give me the red object").features.points
+    assert (np.abs(points[:, 2]) < 0.001).sum() > 1000
+
+
+def test_second_question_costs_only_its_text(
+    lifter: MultiViewLifter, table_views: tuple[CameraView, ...]
+) -> None:
+    encoder = lifter.encoder
+    assert isinstance(encoder, ColorEncoder)
+    first = lifter.perceive(table_views, "give me the red object")
+    assert encoder.num_images == 3
+    encoder.texts.clear()
+    second = lifter.perceive(table_views, "give me the blue object")
+    assert encoder.num_images == 3
+    assert encoder.texts == ["blue object", "give me the blue object"]
+    assert second.geometry is first.geometry
+    assert np.shares_memory(second.features.features, first.features.features)
+
+
+def test_only_new_images_are_encoded(
+    lifter: MultiViewLifter, table_views: tuple[CameraView, ...]
+) -> None:
+    encoder = lifter.encoder
+    assert isinstance(encoder, ColorEncoder)
+    lifter.perceive(table_views, "red")
+    changed = replace(table_views[0], rgb=255 - table_views[0].rgb)
+    lifter.perceive((changed, *table_views[1:]), "red")
+    assert encoder.num_images == 4
+
+
+@pytest.mark.parametrize("capacity", [0, 1, 2])
+def test_small_caches_change_nothing(table_views: tuple[CameraView, ...], capacity: int) -> None:
+    lifter = MultiViewLifter(ColorEncoder(), LifterConfig(num_cached_images=capacity))
+    lifter.perceive(table_views[:2], "red")
+    again = lifter.perceive(table_views, "red").features
+    fresh = MultiViewLifter(ColorEncoder()).perceive(table_views, "red").features
+    np.testing.assert_array_equal(again.features, fresh.features)
+
+
+def test_same_bytes_whatever_the_order_of_views(table_views: tuple[CameraView, ...]) -> None:
+    first = MultiViewLifter(ColorEncoder()).perceive(table_views, "red").features
+    second = MultiViewLifter(ColorEncoder()).perceive(table_views[::-1], "red").features
+    for name in ("points", "colors", "normals", "features", "confidence", "similarity"):
+        assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
+
+
+def test_place_instructions_look_for_the_reference(
+    lifter: MultiViewLifter, table_views: tuple[CameraView, ...]
+) -> None:
+    percept = lifter.perceive(table_views, "put it near the blue object")
+    assert percept.target_phrase == "blue object"
+    assert len(percept.text.tokens) == 6  # the whole instruction, relation included
+    assert len(percept.target_text.tokens) == 2
+
+
+def test_no_object_on_the_table(table_views: tuple[CameraView, ...]) -> None:
+    fusion = FusionConfig(workspace_min=(0.6, 0.1, -0.01), workspace_max=(0.7, 0.2, 0.4))
+    with pytest.raises(EmptyCloudError, match="there is no object in the workspace"):
+        MultiViewLifter(ColorEncoder(), LifterConfig(fusion=fusion)).perceive(table_views, "red")
+
+
+def test_empty_instruction(lifter: MultiViewLifter, table_views: tuple[CameraView, ...]) -> None:
+    with pytest.raises(InvalidTextError, match="Empty instruction '': expected at least one word"):
+        lifter.perceive(table_views, "")
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        (
+            {"feature_voxel_size_m": 0.001},
+            "feature_voxel_size_m is 0.001, expected at least the voxel_size_m of the geometry, "
+            "0.002.",
+        ),
+        (
+            {"num_cached_images": -1},
+            "num_cached_images is -1 and sharpness 10.0, expected 0 or more and more than 0.",
+        ),
+    ],
+)
+def test_bad_config(fields: dict[str, float], message: str) -> None:
+    with pytest.raises(InvalidConfigError) as caught:
+        LifterConfig(**fields)  # pyright: ignore[reportArgumentType]
+    assert str(caught.value) == message
+
+
+def _text(*values: float) -> TextFeatures:
+    pooled = np.float32(values) / np.linalg.norm(values).astype(np.float32)
+    return TextFeatures(pooled=pooled, tokens=pooled[None])
+
+
+def test_relevancy_values() -> None:
+    features = np.eye(3, dtype=np.float32)
+    text, negatives = _text(1, 0, 0), [_text(0, 1, 0), _text(1, 1, 0)]
+    best_negative = np.array([np.sqrt(0.5), 1.0, 0.0])
+    wanted = 1 / (1 + np.exp(-10 * (np.array([1.0, 0.0, 0.0]) - best_negative)))
+    np.testing.assert_allclose(relevancy(features, text, negatives, sharpness=10.0), wanted, 1e-5)
+    np.testing.assert_array_equal(relevancy(features, text, [], sharpness=10.0), [1, 0, 0])
