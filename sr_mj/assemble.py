@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from models.cameras import camera_preset
+from models.workspace import Workspace
 from perception.encoders import load_encoder
 from perception.fusion import FusionConfig
 from perception.lifter import LifterConfig, MultiViewLifter
@@ -23,6 +24,21 @@ from sr_mj.sensors.renderer import CameraRig
 ALL_POLICIES = (*POLICY_NAMES, OraclePolicy.name)
 
 
+def check_policy_name(name: str) -> None:
+    """Refuse the name of a policy that does not exist.
+
+    Args:
+        name: The name; valid are those of `ALL_POLICIES`.
+
+    Raises:
+        UnknownNameError: If there is no such policy.
+    """
+    if name not in ALL_POLICIES:
+        raise UnknownNameError(
+            unknown_name_message("policy", name, ALL_POLICIES).replace("Policys", "Policies")
+        )
+
+
 def make_policy(name: str, scene: Scene, checkpoint: Path | None = None) -> Policy:
     """Make a policy by name; `oracle` is the one that may read the scene.
 
@@ -38,29 +54,28 @@ def make_policy(name: str, scene: Scene, checkpoint: Path | None = None) -> Poli
         UnknownNameError: If there is no such policy.
         PolicyError: If its weights are missing.
     """
-    if name not in ALL_POLICIES:
-        raise UnknownNameError(
-            unknown_name_message("policy", name, ALL_POLICIES).replace("Policys", "Policies")
-        )
+    check_policy_name(name)
     if name == OraclePolicy.name:
         return OraclePolicy(scene)
     return load_policy(name, checkpoint=checkpoint)
 
 
-def lifter_for(scene: Scene, encoder: str, *, allow_download: bool = False) -> MultiViewLifter:
-    """Make the perception stage for a scene's workspace.
+def lifter_for(
+    workspace: Workspace, encoder: str, *, allow_download: bool = False
+) -> MultiViewLifter:
+    """Make the perception stage for a workspace.
 
     Args:
-        scene: The scene.
+        workspace: The box to look at.
         encoder: Name of the encoder; see `perception.encoders.load_encoder`.
         allow_download: Whether missing weights may be fetched from the hub.
 
     Returns:
         The lifter.
     """
-    x, y, z = scene.workspace.lower
+    x, y, z = workspace.lower
     # A little under the table, so that the noise of the table's own points is not cut in half.
-    fusion = FusionConfig(workspace_min=(x, y, z - 0.01), workspace_max=scene.workspace.upper)
+    fusion = FusionConfig(workspace_min=(x, y, z - 0.01), workspace_max=workspace.upper)
     return MultiViewLifter(
         load_encoder(encoder, allow_download=allow_download), LifterConfig(fusion=fusion)
     )

@@ -28,7 +28,7 @@ def main() -> None:
     with mujoco.Renderer(model, height=48, width=64) as renderer:
         renderer.update_scene(data)
         image = renderer.render()
-        name = GL.glGetString(GL.GL_RENDERER).decode()
+        name = bytes(GL.glGetString(GL.GL_RENDERER) or b"").decode()
     print(json.dumps({"renderer": name, "is_uniform": bool((image == image[0, 0]).all())}))
 
 

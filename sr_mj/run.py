@@ -21,7 +21,7 @@ from sr_mj.errors import ConfigError
 
 if TYPE_CHECKING:
     from sr_mj.episode import Attempt
-    from sr_mj.scene import Scene
+    from sr_mj.scene import Scene, SceneConfig
 
 MAX_ATTEMPTS = 100
 
@@ -76,17 +76,15 @@ def _check(config: RunConfig) -> None:
         )
 
 
-def _make_scene(config: RunConfig) -> "Scene":
-    from sr_mj.scene import SceneConfig, make_scene
+def _scene_config(config: RunConfig) -> "SceneConfig":
+    from sr_mj.scene import SceneConfig
 
-    return make_scene(
-        SceneConfig(
-            scene=config.scene,
-            split=config.split,  # pyright: ignore[reportArgumentType]  # checked there
-            seed=config.seed,
-            goal=config.goal,
-            cameras=config.cameras,
-        )
+    return SceneConfig(
+        scene=config.scene,
+        split=config.split,  # pyright: ignore[reportArgumentType]  # checked there
+        seed=config.seed,
+        goal=config.goal,
+        cameras=config.cameras,
     )
 
 
@@ -157,15 +155,21 @@ def run(config: RunConfig) -> int:
 
     # Before anything imports dm_control, which binds OpenGL to one library for good.
     select_backend()
-    from sr_mj.assemble import assembled, lifter_for, make_policy
+    from sr_mj.assemble import assembled, check_policy_name, lifter_for, make_policy
     from sr_mj.episode import run_episode
+    from sr_mj.scene import make_scene
     from sr_mj.video import VideoRecorder, check_video_path
 
+    # Mistakes first: nothing is made before every name is known to exist.
+    scene_config = _scene_config(config)
+    check_policy_name(config.policy)
     if config.record is not None:
         check_video_path(config.record)
-    scene = _make_scene(config)
+    lifter = lifter_for(
+        scene_config.kind.workspace, config.encoder, allow_download=config.allow_download
+    )
+    scene = make_scene(scene_config)
     policy = make_policy(config.policy, scene, config.checkpoint)
-    lifter = lifter_for(scene, config.encoder, allow_download=config.allow_download)
     reporter = _Reporter(config, scene)
     reporter.begin()
     with contextlib.ExitStack() as stack:

@@ -1,3 +1,4 @@
+import os
 import subprocess
 import sys
 
@@ -50,3 +51,16 @@ def test_help_loads_nothing_heavy(module):
     )
     assert done.returncode == 0, done.stderr
     assert "options" in done.stdout
+
+
+@pytest.mark.parametrize("backend", ["egl", "osmesa"])
+def test_simulator_and_torch_load_in_one_process(backend):
+    # dm_control loads the graphics library's LLVM, torchvision that of triton.
+    code = "import models.tabletop, sr_mj.scene.compose, torchvision, open_clip"
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        env={**os.environ, "MUJOCO_GL": backend, "PYOPENGL_PLATFORM": backend},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr

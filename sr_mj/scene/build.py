@@ -19,6 +19,7 @@ from sr_mj.scene.goals import Goal, draw_goal, find_targets
 from sr_mj.scene.settle import Drop, FreeBody, Settler, heap_drop
 
 _LAYOUT_TRIES = 20
+_LAYOUTS_PER_DRAW = 4
 _SPACING_TRIES = 2000
 _SET_DOWN_M = 0.01
 _GRASP_MARGIN_M = 0.008
@@ -186,6 +187,19 @@ def _reset_to(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
     return data
 
 
+def _placed_objects(
+    assets: list[ObjectAsset], bodies: tuple[FreeBody, ...], data: mujoco.MjData
+) -> tuple[SceneObject, ...]:
+    return tuple(
+        SceneObject(
+            asset=asset,
+            body=body,
+            graspable=_is_graspable(asset, data.xmat[body.body_id].reshape(3, 3)),
+        )
+        for asset, body in zip(assets, bodies, strict=True)
+    )
+
+
 def make_scene(config: SceneConfig) -> Scene:
     """Make a scene: draw objects, compose, drop them, let them settle, draw the goal.
 
@@ -199,26 +213,24 @@ def make_scene(config: SceneConfig) -> Scene:
         SceneError: If the objects will not settle in the workspace, or no goal can be drawn.
     """
     draw_rng, settle_rng, goal_rng = np.random.default_rng(config.seed).spawn(3)
-    assets = _draw_assets(config, draw_rng)
-    composed = compose_scene(assets, config.cameras)
-    for _ in range(_LAYOUT_TRIES):
+    for attempt in range(_LAYOUT_TRIES):
+        if attempt % _LAYOUTS_PER_DRAW == 0:
+            assets = _draw_assets(config, draw_rng)
+            composed = compose_scene(assets, config.cameras)
         qpos = _settle(composed, config.kind, settle_rng)
-        if qpos is not None:
+        if qpos is None:
+            continue
+        data = _reset_to(composed.model, qpos)
+        objects = _placed_objects(assets, composed.bodies, data)
+        # A goal can only be drawn if something can be held as it came to lie.
+        if config.goal is not None or not objects or any(item.graspable for item in objects):
             break
     else:
         raise SceneError(
-            f"{_LAYOUT_TRIES} layouts of scene {config.scene!r} with seed {config.seed} fell "
-            "over or too close together; use another seed or other objects."
+            f"{_LAYOUT_TRIES} layouts of scene {config.scene!r} with seed {config.seed} fell over, "
+            "too close together, or with nothing that the gripper can hold; use another seed or "
+            "other objects."
         )
-    data = _reset_to(composed.model, qpos)
-    objects = tuple(
-        SceneObject(
-            asset=asset,
-            body=body,
-            graspable=_is_graspable(asset, data.xmat[body.body_id].reshape(3, 3)),
-        )
-        for asset, body in zip(assets, composed.bodies, strict=True)
-    )
     settled = data.qpos.copy()
     settled.setflags(write=False)
     return Scene(

@@ -19,6 +19,8 @@ from sr_mj.scene.settle import FreeBody
 OBJECT_BODY = "object"
 """Name of the body in every object's tree."""
 
+_WAITING_HEIGHT_M, _WAITING_GAP_M = 2.0, 0.6
+
 
 @dataclass(frozen=True, kw_only=True)
 class ComposedScene:
@@ -71,13 +73,15 @@ def compose_scene(
         model_name: Name of the MJCF model.
 
     Returns:
-        The scene, objects at the world's origin.
+        The scene; in `qpos0` the objects hover above each other, high over the table, clear of
+        everything and of one another.
     """
     root = build_tabletop(model_name)
     attach_robot(root)
     add_cameras(root, (*camera_preset(cameras), OVERVIEW))
-    for asset in assets:
+    for index, asset in enumerate(assets):
         frame = root.attach(build_object(asset, name=asset.name))
+        frame.pos = (0.5, 0, _WAITING_HEIGHT_M + index * _WAITING_GAP_M)
         frame.add("freejoint")
     model = compile_mjcf(root)
     return ComposedScene(

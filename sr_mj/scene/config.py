@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from models.cameras import camera_preset
 from models.workspace import GRASP_WORKSPACE, PICK_PLACE_WORKSPACE, Workspace
 from sr_mj.errors import ConfigError, UnknownNameError, unknown_name_message
 
@@ -74,7 +75,7 @@ class SceneConfig:
         cameras: Camera preset, one of `models.cameras.CAMERA_PRESETS`.
 
     Raises:
-        UnknownNameError: If scene or split do not exist.
+        UnknownNameError: If scene, split or cameras do not exist.
         ConfigError: If the seed is negative or the goal is blank.
     """
 
@@ -91,6 +92,7 @@ class SceneConfig:
             raise UnknownNameError(unknown_name_message("scene", self.scene, SCENE_KINDS))
         if self.split not in SPLITS:
             raise UnknownNameError(unknown_name_message("split", self.split, SPLITS))
+        camera_preset(self.cameras)
         if self.seed < 0:
             raise ConfigError(f"Seed is {self.seed}; expected an integer of 0 or more.")
         if self.goal is not None and not self.goal.strip():

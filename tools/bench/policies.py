@@ -57,7 +57,7 @@ def run_one(config: BenchConfig, policy: str, seed: int) -> dict:
     from sr_mj.scene import SceneConfig, make_scene
 
     scene = make_scene(SceneConfig(scene=config.scene, split=config.split, seed=seed))  # pyright: ignore[reportArgumentType]
-    lifter = lifter_for(scene, config.encoder)
+    lifter = lifter_for(scene.workspace, config.encoder)
     with assembled(scene, lifter=lifter, policy=make_policy(policy, scene)) as pipeline:
         attempts = list(run_episode(scene, pipeline, seed=seed, max_attempts=config.attempts))
     return {"policy": policy, **episode_record(scene, attempts, config.attempts)}
