@@ -112,9 +112,10 @@ class AntipodalSampler:
         placements = self._promising(search.placements, limits)
         contacts = find_contacts(placements, search.around, search.surface.normals, config)
         poses = self._tool_poses(search.origins, placements, contacts)
-        prior = grasp_prior(contacts, placements.engagement_m, poses[:, 2, 2], config)
+        prior = grasp_prior(contacts, placements.engagement_m, poses[:, 2, 2])
         low, high = swept_boxes(self.approach_opening(contacts.width_m), config)
-        is_good = contacts.alignment.min(axis=1) > limits.min_alignment
+        is_good = prior >= config.min_prior
+        is_good &= contacts.alignment.min(axis=1) > limits.min_alignment
         is_good &= contacts.opposition < limits.max_opposition
         is_good &= contacts.width_m < config.gripper.max_width_m
         is_good &= table_clearance(poses, low, high) > config.min_tip_height_m - _ROUNDING_M

@@ -49,8 +49,8 @@ class Relaxation:
 # First let the noise of the cloud reach into the gripper's boxes, which at worst pushes a
 # neighbour; then give up alignment, which costs grip.
 _DEFAULT_RELAXATIONS = (
-    Relaxation(min_alignment=0.4, max_opposition=-0.6, clearance_m=-0.002),
-    Relaxation(min_alignment=0.25, max_opposition=-0.3, clearance_m=-0.002),
+    Relaxation(min_alignment=0.4, max_opposition=-0.3, clearance_m=-0.002),
+    Relaxation(min_alignment=0.25, max_opposition=-0.2, clearance_m=-0.002),
 )
 
 
@@ -79,7 +79,7 @@ class AntipodalConfig:
             on both sides. 0.4 is loose: normals are blurred by noise and unseen sides are judged
             by their outline; the prior tells good from bad.
         max_opposition: Largest cosine between the two mean contact normals; -1 is perfectly
-            antipodal. Rejects wedges and corners, out of which an object slips.
+            antipodal. Loose too: it rejects corners, out of which an object slips.
         extra_opening_m: How much wider than the contact width the gripper opens for the
             approach, half of it on each side, capped at the gripper's stroke. Whoever executes a
             candidate must open as wide, not wider: this opening was checked for collisions.
@@ -93,6 +93,7 @@ class AntipodalConfig:
         max_placements: Most finger placements whose contacts are examined, shared out among the
             seeds; bounds the run time.
         max_survivors: Most grasps that reach the exact collision check; bounds the run time.
+        min_prior: Least prior of a candidate; of those below, one in ten is antipodal.
         max_candidates: Most candidates returned.
         nms_distance_m: Candidates closer than this, and ...
         nms_angle_deg: ... turned by less than this, count as one; the better stays.
@@ -115,7 +116,7 @@ class AntipodalConfig:
     tilts_deg: tuple[float, ...] = (0.0, 25.0, -25.0, 50.0, -50.0)
     depths_m: tuple[float, ...] = (0.006, 0.013, 0.022, 0.032)
     min_alignment: float = 0.4
-    max_opposition: float = -0.5
+    max_opposition: float = -0.3
     extra_opening_m: float = 0.02
     clearance_m: float = 0.0
     min_tip_height_m: float = 0.003
@@ -124,6 +125,7 @@ class AntipodalConfig:
     wrist_length_m: float = 0.10
     max_placements: int = 1600
     max_survivors: int = 550
+    min_prior: float = 0.1
     max_candidates: int = 180
     nms_distance_m: float = 0.008
     nms_angle_deg: float = 20.0
@@ -146,6 +148,7 @@ class AntipodalConfig:
             if getattr(self, name) < 1:
                 raise ConfigError(f"{owner}: {name} is {getattr(self, name)}, expected 1 or more.")
         _check(owner, "min_alignment", self.min_alignment, 0.0, 1.0)
+        _check(owner, "min_prior", self.min_prior, 0.0, 1.0)
         _check(owner, "max_opposition", self.max_opposition, -1.0, 0.0)
         _check(owner, "clearance_m", self.clearance_m, _LEAST_CLEARANCE_M, 0.02)
         self._check_lists(owner)

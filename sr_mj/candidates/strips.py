@@ -23,6 +23,8 @@ _LANE_M = 2 * _STRIP_HALF_M / _NUM_LANES
 _EMPTY = -1.0
 # Points this little above the fingertips' plane do not stop a finger; noise does as much.
 _TOUCH_M = 0.001
+# The highest of many noisy points stands out by this much.
+_NOISE_M = 0.0015
 # The finger's thickness and 2 mm.
 _FINGER_BINS = 4
 _MIN_DEPTH_M = 0.0035
@@ -176,8 +178,8 @@ def _outline(heights: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.nda
         # (H, lanes, 5): bins from the contact inwards, never past the other contact.
         steps = edge[:, None] + sign * np.arange(6)
         inner = np.take_along_axis(heights, steps.clip(0, _NUM_BINS - 1)[:, None], axis=2)
-        steepness = inner[:, :, :3].max(axis=1) / ((np.arange(3) + 1) * _BIN_M)
-        steepness = steepness.max(axis=1).clip(1e-3)
+        rise = inner[:, :, :3].max(axis=1) - _NOISE_M
+        steepness = (rise / ((np.arange(3) + 1) * _BIN_M)).max(axis=1).clip(1e-3)
         solid = inner > _TOUCH_M
         first = np.where(solid.any(axis=2), solid.argmax(axis=2), 6) * sign
         yaw = (first[:, 2] - first[:, 0]) * (_BIN_M / (2 * _LANE_M))

@@ -17,6 +17,7 @@ _CALM_LINEAR, _CALM_ANGULAR = 0.002, 0.05  # m/s and rad/s
 _CALM_FOR_S = 0.2
 _SETTLE_LIMIT_S = 6.0
 _MAX_REDROPS = 12
+_RELEASE_SPEED = 0.01  # m/s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +124,8 @@ class Settler:
         while self._touches(body):
             qpos[2] += 0.03
             mujoco.mj_forward(self._model, self._data)
+        # Moving, if only just: a body that fell asleep on the table would go on sleeping in the air.
+        self._data.qvel[body.dof_adr + 2] = -_RELEASE_SPEED
         # Falling objects do not creep: the no-slip pass would double the time for nothing.
         passes = self._model.opt.noslip_iterations
         self._model.opt.noslip_iterations = 0

@@ -9,6 +9,7 @@ from sr_mj.errors import ConfigError, SceneError, UnknownNameError
 from sr_mj.scene import SCENE_KINDS, SPLITS, SceneConfig, find_targets, make_scene
 from sr_mj.scene.build import narrowest_width
 from sr_mj.scene.goals import draw_goal
+from sr_mj.scene.settle import Drop, Settler
 
 WORDS = {name: object_words(name) for split in SPLITS for name in object_names(split)}
 
@@ -155,3 +156,23 @@ def test_narrowest_width_of_a_turned_plank():
 
 def test_workspace_contains():
     assert GRASP_WORKSPACE.contains_xy([[0.5, 0, 9], [0.2, 0, 0]]).tolist() == [True, False]
+
+
+def test_an_object_that_sleeps_on_the_table_falls_when_it_is_dropped_again():
+    scene = make_scene(SceneConfig(scene="single", objects=("dove",), goal="the dove"))
+    body = scene.objects[0].body
+    mujoco.mj_step(scene.model, scene.data, 2000)
+    resting = scene.data.xipos[body.body_id][2]
+    settler = Settler(scene.model, scene.data, [body], scene.workspace)
+    drop = Drop(position=np.array([0.5, 0.0, 0.5]), quat_wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
+    settler.drop(body, drop)
+    settler.wait_until_calm()
+    assert scene.data.xipos[body.body_id][2] < resting + 0.1
+
+
+@pytest.mark.parametrize("seed", range(5, 9))
+def test_every_object_of_a_heap_rests_on_something(seed):
+    scene = make_scene(SceneConfig(seed=seed))
+    touching = scene.model.geom_bodyid[scene.data.contact.geom[: scene.data.ncon]]
+    for item in scene.objects:
+        assert item.body.body_id in touching, item.name
