@@ -30,6 +30,8 @@ def set_physics_options(root: mjcf.RootElement) -> None:
     # no-slip pass stops that, and what then lies still may sleep until something touches it.
     root.option.noslip_iterations = 5
     root.option.flag.sleep = "enable"
+    # At MuJoCo's own 1 mm/s heaps of many-part objects tremble on for ever, moving nowhere.
+    root.option.sleep_tolerance = 0.005
     root.size.memory = "256M"
 
 

@@ -16,7 +16,6 @@ _PHRASES = {
     Reason.EMPTY_CLOSE: "closed on nothing",
     Reason.SLIPPED_LIFT: "lost it while lifting",
     Reason.SLIPPED_CARRY: "lost it while carrying",
-    Reason.TIMED_OUT: "timed out",
 }
 
 

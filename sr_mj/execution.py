@@ -27,7 +27,7 @@ class ExecutionConfig:
         arrive_limit_s: Longest wait for that after a motion's nominal end.
         blocked_tol_rad: Joint error at the end of the approach from which on something is in the
             way: 0.01 rad is about 5 mm at the tool.
-        close_limit_s: Longest time that the fingers may take.
+        close_limit_s: Longest time that the fingers may take; what they press on may tremble.
         still_speed: Finger speed below which they have stopped, m/s.
         still_for_s: How long they must have stopped.
         empty_width_m: Opening at or under which nothing is between the fingers.
@@ -114,9 +114,7 @@ class Executor:
         if error > self.config.blocked_tol_rad:
             self._go_back(segments, (Phase.APPROACH, Phase.TRANSIT))
             return Reason.APPROACH_COLLISION, None
-        if not self._close():
-            self._go_back(segments, (Phase.APPROACH, Phase.TRANSIT))
-            return Reason.TIMED_OUT, None
+        self._close()
         if self.width_m <= self.config.empty_width_m:
             self._go_back(segments, (Phase.APPROACH, Phase.TRANSIT))
             return Reason.EMPTY_CLOSE, None
@@ -194,18 +192,17 @@ class Executor:
         while abs(self._data.ctrl[self._finger_ctrl] - target) > 1e-9:
             self._step(None, width_m)
 
-    def _close(self) -> bool:
-        """Close until the fingers stop against something or each other; False if they never do."""
+    def _close(self) -> None:
+        """Close until the fingers stop against something or each other, or time is up."""
         step = self._model.opt.timestep
         still = waited = 0.0
-        while still < self.config.still_for_s or self._data.ctrl[self._finger_ctrl] > 0:
-            if waited > self.config.close_limit_s:
-                return False
+        closing = True
+        while closing and waited < self.config.close_limit_s:
             self._step(None, 0.0)
             speed = np.abs(self._data.qvel[self._finger_dofs]).max()
             still = still + step if speed < self.config.still_speed else 0.0
             waited += step
-        return True
+            closing = still < self.config.still_for_s or self._data.ctrl[self._finger_ctrl] > 0
 
     def _heights(self) -> dict[str, float]:
         return {item.name: self._data.xipos[item.body.body_id][2] for item in self._scene.objects}

@@ -20,7 +20,6 @@ class Reason(StrEnum):
     EMPTY_CLOSE = "empty_close"
     SLIPPED_LIFT = "slipped_lift"
     SLIPPED_CARRY = "slipped_carry"
-    TIMED_OUT = "timed_out"
 
     @property
     def is_grasp(self) -> bool:

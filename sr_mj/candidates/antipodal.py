@@ -18,6 +18,7 @@ from sr_mj.candidates.neighbourhoods import Neighbourhoods, gather_neighbours
 from sr_mj.candidates.ranking import best_per_group, grasp_prior, select_spread
 from sr_mj.candidates.strips import FingerPlacements, depth_hypotheses, place_fingers, scan_strips
 from sr_mj.candidates.surface import ObjectSurface, choose_seeds, extract_surface, thin
+from sr_mj.candidates.threads import single_threaded
 
 # A strip reaches 70 mm to either side of its seed, contacts and their balance 55 mm.
 _STRIP_RADIUS_M, _CONTACT_RADIUS_M = 0.07, 0.055
@@ -69,14 +70,14 @@ class AntipodalSampler:
         """
         surface = extract_surface(cloud.points, cloud.normals, self.config)
         seeds = choose_seeds(surface.points, self.config, rng)
-        if not len(seeds):
-            return _no_candidates()
-        search = self._search(surface, seeds)
         candidates = _no_candidates()
-        for limits in self.config.passes:
-            candidates = self._finish(search, limits)
-            if len(candidates):
-                break
+        if len(seeds):
+            with single_threaded():
+                search = self._search(surface, seeds)
+                for limits in self.config.passes:
+                    candidates = self._finish(search, limits)
+                    if len(candidates):
+                        break
         return candidates
 
     def approach_opening(self, width_m: np.ndarray) -> np.ndarray:

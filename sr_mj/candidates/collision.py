@@ -71,11 +71,13 @@ def hits_points(
     for start in range(0, len(hits), _ROWS_A_CHUNK):
         rows = order[start : start + _ROWS_A_CHUNK]
         poses, lower, upper = Ts_world_tool[rows], low[rows], high[rows]
-        nearby = torch.from_numpy(points[_is_within_bounds(points, poses, lower, upper)])
+        nearby = points[_is_within_bounds(points, poses, lower, upper)]
         axes = poses[:, :3, :3].transpose(0, 2, 1)
-        shift = torch.from_numpy(np.einsum("kij,kj->ki", axes, poses[:, :3, 3]).astype(np.float32))
-        local = torch.from_numpy(axes.reshape(-1, 3).astype(np.float32)) @ nearby.T
-        local = local.view(len(rows), 3, -1) - shift[..., None]
+        shift = torch.from_numpy(np.einsum("kij,kj->ki", axes, poses[:, :3, 3]))
+        # In double precision: BLAS rounds differently from call to call, and a point on the border
+        # of a box in single precision would then be in or out by chance.
+        local = torch.from_numpy(axes.reshape(-1, 3)) @ torch.from_numpy(nearby.T.astype(float))
+        local = (local.view(len(rows), 3, -1) - shift[..., None]).float()
         hits[rows] = _any_inside(local, torch.from_numpy(lower), torch.from_numpy(upper)).numpy()
     return hits
 

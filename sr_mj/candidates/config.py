@@ -49,8 +49,8 @@ class Relaxation:
 # First let the noise of the cloud reach into the gripper's boxes, which at worst pushes a
 # neighbour; then give up alignment, which costs grip.
 _DEFAULT_RELAXATIONS = (
-    Relaxation(min_alignment=0.4, max_opposition=-0.3, clearance_m=-0.002),
-    Relaxation(min_alignment=0.25, max_opposition=-0.2, clearance_m=-0.002),
+    Relaxation(min_alignment=0.4, max_opposition=-0.4, clearance_m=-0.001),
+    Relaxation(min_alignment=0.3, max_opposition=-0.4, clearance_m=-0.001),
 )
 
 
@@ -79,7 +79,7 @@ class AntipodalConfig:
             on both sides. 0.4 is loose: normals are blurred by noise and unseen sides are judged
             by their outline; the prior tells good from bad.
         max_opposition: Largest cosine between the two mean contact normals; -1 is perfectly
-            antipodal. Loose too: it rejects corners, out of which an object slips.
+            antipodal. Rejects wedges and corners, out of which an object slips.
         extra_opening_m: How much wider than the contact width the gripper opens for the
             approach, half of it on each side, capped at the gripper's stroke. Whoever executes a
             candidate must open as wide, not wider: this opening was checked for collisions.
@@ -109,14 +109,14 @@ class AntipodalConfig:
     object_min_height_m: float = 0.0045
     voxel_m: float = 0.004
     scan_voxel_m: float = 0.005
-    wall_step_m: float = 0.006
+    wall_step_m: float = 0.005
     seed_spacing_m: float = 0.011
     max_seeds: int = 450
     num_rolls: int = 6
     tilts_deg: tuple[float, ...] = (0.0, 25.0, -25.0, 50.0, -50.0)
     depths_m: tuple[float, ...] = (0.006, 0.013, 0.022, 0.032)
     min_alignment: float = 0.4
-    max_opposition: float = -0.3
+    max_opposition: float = -0.4
     extra_opening_m: float = 0.02
     clearance_m: float = 0.0
     min_tip_height_m: float = 0.003

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from sr_mj.candidates.config import AntipodalConfig
-from sr_mj.candidates.neighbourhoods import Neighbourhoods
+from sr_mj.candidates.neighbourhoods import Neighbourhoods, exact_axes
 from sr_mj.candidates.strips import OUTWARD, FingerPlacements
 
 # Points this close to the outermost one make a contact patch; a soft pad and the noise of the
@@ -87,7 +87,7 @@ def _points_between(
     """Express the points between the fingers in tool axes: x from the middle, height over tips."""
     size = around.count[placements.seed].max(initial=0)
     offsets = torch.from_numpy(around.offsets[placements.seed, :size])
-    local = torch.bmm(offsets, torch.from_numpy(placements.rotation))
+    local = torch.bmm(offsets, exact_axes(placements.rotation))
     x = local[..., 0] - torch.from_numpy(placements.center_m)[:, None]
     reach = torch.from_numpy(placements.width_m / 2 + _EDGE_MARGIN_M)[:, None]
     height = torch.from_numpy(placements.depth_m)[:, None] - local[..., 2]

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from sr_mj.candidates.config import AntipodalConfig
-from sr_mj.candidates.neighbourhoods import Neighbourhoods
+from sr_mj.candidates.neighbourhoods import Neighbourhoods, exact_axes
 
 _BIN_M = 0.004
 _HALF_BINS = 17
@@ -25,6 +25,8 @@ _EMPTY = -1.0
 _TOUCH_M = 0.001
 # The highest of many noisy points stands out by this much.
 _NOISE_M = 0.0015
+# How far inwards from the contact an outline that runs askew is followed.
+_EDGE_BINS = 6
 # The finger's thickness and 2 mm.
 _FINGER_BINS = 4
 _MIN_DEPTH_M = 0.0035
@@ -104,7 +106,7 @@ def _scan(offsets: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     count, num_orientations = rotations.shape[:2]
     local = torch.from_numpy(offsets)
     # (3, s, 3, O): the world components of each tool axis.
-    axes = torch.from_numpy(np.ascontiguousarray(rotations.transpose(3, 0, 2, 1)))
+    axes = exact_axes(rotations).permute(3, 0, 2, 1).contiguous()
     y = torch.bmm(local, axes[1]).flatten()
     keep = torch.nonzero(y.abs() < _STRIP_HALF_M)[:, 0]
     x = torch.bmm(local, axes[0]).flatten()[keep]
@@ -175,15 +177,17 @@ def _outline(heights: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.nda
     """Normals of both flanks from heights (H, lanes, bins) over the fingertips' plane."""
     normals = np.empty((len(heights), 2, 3), np.float32)
     for side, (edge, sign) in enumerate(((left, 1), (right, -1))):
-        # (H, lanes, 5): bins from the contact inwards, never past the other contact.
-        steps = edge[:, None] + sign * np.arange(6)
+        # (H, lanes, 8): bins from the contact inwards.
+        steps = edge[:, None] + sign * np.arange(_EDGE_BINS + 3)
         inner = np.take_along_axis(heights, steps.clip(0, _NUM_BINS - 1)[:, None], axis=2)
-        rise = inner[:, :, :3].max(axis=1) - _NOISE_M
-        steepness = (rise / ((np.arange(3) + 1) * _BIN_M)).max(axis=1).clip(1e-3)
-        solid = inner > _TOUCH_M
-        first = np.where(solid.any(axis=2), solid.argmax(axis=2), 6) * sign
-        yaw = (first[:, 2] - first[:, 0]) * (_BIN_M / (2 * _LANE_M))
-        normal = np.stack([np.full(len(edge), -sign), sign * yaw, -1 / steepness], axis=1)
+        solid = inner[..., :_EDGE_BINS] > _TOUCH_M
+        is_hit = solid.any(axis=2)
+        first = np.where(is_hit, solid.argmax(axis=2), _EDGE_BINS)
+        yaw = (first[:, 2] - first[:, 0]) * (sign * _BIN_M / (2 * _LANE_M))
+        rise = np.take_along_axis(inner, first[..., None] + np.arange(3), axis=2) - _NOISE_M
+        steepness = (rise / (np.arange(1, 4) * _BIN_M)).max(axis=2).clip(1e-3)
+        steepness = (steepness * is_hit).sum(axis=1) / is_hit.sum(axis=1).clip(1)
+        normal = np.stack([np.full(len(edge), -sign), sign * yaw, -1 / steepness.clip(1e-3)], axis=1)
         normals[:, side] = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     return normals
 

@@ -60,8 +60,8 @@ def _is_supported(xy: np.ndarray) -> np.ndarray:
     x, y = (cells - cells.min(axis=0) + 1).T
     count = np.zeros((x.max() + 2, y.max() + 2), np.int64)
     np.add.at(count, (x, y), 1)
-    around = sum(count[x + dx, y + dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1))
-    return around >= _MIN_SUPPORT
+    around = [count[x + dx, y + dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)]
+    return np.sum(around, axis=0) >= _MIN_SUPPORT
 
 
 def voxel_keys(points: np.ndarray, edge_m: float) -> np.ndarray:

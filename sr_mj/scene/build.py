@@ -16,7 +16,7 @@ from sr_mj.errors import SceneError
 from sr_mj.scene.compose import OBJECT_BODY, ComposedScene, compose_scene, home_state
 from sr_mj.scene.config import SceneConfig, SceneKind
 from sr_mj.scene.goals import Goal, draw_goal, find_targets
-from sr_mj.scene.settle import Drop, FreeBody, Settler, heap_drop
+from sr_mj.scene.settle import DROP_HEIGHT_M, Drop, FreeBody, Settler, heap_drop
 
 _LAYOUT_TRIES = 20
 _LAYOUTS_PER_DRAW = 4
@@ -169,7 +169,9 @@ def _settle(
     for body, center in zip(spread, _spread_centers(kind, rng), strict=True):
         settler.drop(body, _set_down(body, center, rng))
     for body in heaped:
-        settler.drop(body, heap_drop(kind.heap_center, kind.heap_half_m, rng, body.radius_m))
+        settler.drop(
+            body, heap_drop(kind.heap_center, kind.heap_half_m, rng, DROP_HEIGHT_M + body.radius_m)
+        )
     if heaped:
         settler.recover(kind.heap_center, kind.heap_half_m, rng)
     else:

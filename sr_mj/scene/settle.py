@@ -16,7 +16,8 @@ _CHECK_INTERVAL_S = 0.05
 _CALM_LINEAR, _CALM_ANGULAR = 0.002, 0.05  # m/s and rad/s
 _CALM_FOR_S = 0.2
 _SETTLE_LIMIT_S = 6.0
-_MAX_REDROPS = 12
+_REDROP_HEIGHT_M = 0.02
+_MAX_REDROPS = 40
 _RELEASE_SPEED = 0.01  # m/s
 
 
@@ -65,7 +66,10 @@ class Drop:
 
 
 def heap_drop(
-    center: tuple[float, float], half_m: float, rng: np.random.Generator, radius_m: float = 0.0
+    center: tuple[float, float],
+    half_m: float,
+    rng: np.random.Generator,
+    height_m: float = DROP_HEIGHT_M,
 ) -> Drop:
     """Draw a drop pose over a heap: anywhere in a square, in any orientation.
 
@@ -73,16 +77,14 @@ def heap_drop(
         center: x, y of the square's centre, metres.
         half_m: Half its width, metres.
         rng: Source of randomness.
-        radius_m: Size of the object; its lowest point starts `DROP_HEIGHT_M` above the table or
-            higher.
+        height_m: Height of the object's frame over the table.
 
     Returns:
         The pose.
     """
     xy = rng.uniform(-half_m, half_m, 2) + center
     quat = Rotation.random(rng=rng).as_quat(scalar_first=True)
-    height = DROP_HEIGHT_M + radius_m
-    return Drop(position=np.array([*xy, height]), quat_wxyz=quat)
+    return Drop(position=np.array([*xy, height_m]), quat_wxyz=quat)
 
 
 class Settler:
@@ -158,7 +160,9 @@ class Settler:
         return [body for body, ok in zip(self._bodies, inside, strict=True) if not ok]
 
     def recover(self, center: tuple[float, float], half_m: float, rng: np.random.Generator) -> None:
-        """Drop again whatever came to rest outside the workspace.
+        """Drop again whatever came to rest outside the workspace, from just above what lies there.
+
+        From the full height a ball would bounce off the heap again and again.
 
         Args:
             center: x, y about which to drop, metres.
@@ -174,8 +178,8 @@ class Settler:
             if not lost:
                 return
             for body in lost:
-                self.drop(body, heap_drop(center, half_m / 2, rng, body.radius_m))
-        names = ", ".join(body.name for body in self.outside())
+                self.drop(body, heap_drop(center, half_m / 2, rng, _REDROP_HEIGHT_M))
+        names = ", ".join(body.name for body in lost)
         raise SceneError(
             f"After {_MAX_REDROPS} tries these objects still do not stay in the workspace: {names}."
             " Use another seed, fewer objects or a larger workspace."

@@ -139,7 +139,7 @@ POLICIES = "grounding, random, sr, oracle"
         ("run", ["--scene", "cluttered51"], "Unknown scene 'cluttered51'. Scenes: cluttered15, place8, pickplace8, single, empty. Did you mean 'cluttered15'?"),
         ("run", ["--split", "unsen"], "Unknown split 'unsen'. Splits: seen, unseen. Did you mean 'unseen'?"),
         ("run", ["--policy", "grunding", "--scene", "single"], f"Unknown policy 'grunding'. Policies: {POLICIES}. Did you mean 'grounding'?"),
-        ("run", ["--cameras", "ar", "--scene", "single"], "Unknown camera preset 'ar'. Presets: sr, a2. Did you mean 'sr'?"),
+        ("run", ["--cameras", "srr", "--scene", "single"], "Unknown camera preset 'srr'. Presets: sr, a2. Did you mean 'sr'?"),
         ("run", ["--seed", "-3"], "Seed is -3; expected an integer of 0 or more."),
         ("run", ["--attempts", "0"], "Attempts is 0; expected 1 to 100."),
         ("run", ["--goal", ""], "The goal is blank; say what to grasp, or leave the goal out."),
