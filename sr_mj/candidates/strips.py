@@ -187,7 +187,9 @@ def _outline(heights: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.nda
         rise = np.take_along_axis(inner, first[..., None] + np.arange(3), axis=2) - _NOISE_M
         steepness = (rise / (np.arange(1, 4) * _BIN_M)).max(axis=2).clip(1e-3)
         steepness = (steepness * is_hit).sum(axis=1) / is_hit.sum(axis=1).clip(1)
-        normal = np.stack([np.full(len(edge), -sign), sign * yaw, -1 / steepness.clip(1e-3)], axis=1)
+        normal = np.stack(
+            [np.full(len(edge), -sign), sign * yaw, -1 / steepness.clip(1e-3)], axis=1
+        )
         normals[:, side] = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     return normals
 

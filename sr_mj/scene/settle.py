@@ -126,7 +126,7 @@ class Settler:
         while self._touches(body):
             qpos[2] += 0.03
             mujoco.mj_forward(self._model, self._data)
-        # Moving, if only just: a body that fell asleep on the table would go on sleeping in the air.
+        # Moving, if only just: a body asleep on the table would go on sleeping in the air.
         self._data.qvel[body.dof_adr + 2] = -_RELEASE_SPEED
         # Falling objects do not creep: the no-slip pass would double the time for nothing.
         passes = self._model.opt.noslip_iterations
