@@ -110,8 +110,7 @@ def _measure(placements: FingerPlacements, between: _Between, config: AntipodalC
     row, x, normal = between.row[is_pinched], between.x[is_pinched], between.normal[is_pinched]
     low, high = _extent(row, x, placements.width_m)
 
-    reach = np.minimum(_PATCH_M, (high - low) / 2)[row]
-    patches = (x <= low[row] + reach, x >= high[row] - reach)
+    patches = (x < low[row] + _PATCH_M, x > high[row] - _PATCH_M)
     sizes = np.stack([np.bincount(row[patch], minlength=count) for patch in patches], axis=1)
     mean = np.stack([_row_means(row, axis, patches, sizes) for axis in normal.T], axis=-1)
     seen, outlined = mean[..., 0] * OUTWARD, _OUTLINE_TRUST * placements.alignment

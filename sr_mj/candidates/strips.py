@@ -142,13 +142,22 @@ def place_fingers(
     """
     tip = -depth_m[:, None]
     highest = profiles.max(axis=1)
-    left, right, found = _find_gaps(highest <= tip + _TOUCH_M)
+    free = highest <= tip + _TOUCH_M
+    gap = free[:, : 1 - _FINGER_BINS].copy()
+    for shift in range(1, _FINGER_BINS):
+        gap &= free[:, shift : _NUM_BINS - _FINGER_BINS + 1 + shift]
+    last_left = _HALF_BINS - _FINGER_BINS
+    left_gaps, right_gaps = gap[:, : last_left + 1], gap[:, _HALF_BINS + 1 :]
+    # Contact bins: the first ones that are not free when a finger comes from outside.
+    left = last_left - np.argmax(left_gaps[:, ::-1], axis=1) + _FINGER_BINS
+    right = _HALF_BINS + np.argmax(right_gaps, axis=1)
     width = (right - left + 1) * _BIN_M
     bins = np.arange(_NUM_BINS)
     between = (bins >= left[:, None]) & (bins <= right[:, None])
     engagement = np.where(between, highest, _EMPTY).max(axis=1) + depth_m
     gripper = config.gripper
     finger_length = gripper.palm_above_tool_m + gripper.tip_below_tool_m
+    found = left_gaps.any(axis=1) & right_gaps.any(axis=1)
     found &= (width <= gripper.max_width_m) & (engagement < finger_length - config.clearance_m)
     rows = np.flatnonzero(found)
     left, right = left[rows], right[rows]
@@ -162,22 +171,6 @@ def place_fingers(
         engagement_m=engagement[rows],
         outline=outline,
     )
-
-
-def _find_gaps(free: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the gaps next to the seed in rows of free bins (H, bins).
-
-    Returns the left and right contact bins, the first ones that are not free when a finger closes
-    from its gap, and a mask of the rows that have both gaps.
-    """
-    gap = free[:, : 1 - _FINGER_BINS].copy()
-    for shift in range(1, _FINGER_BINS):
-        gap &= free[:, shift : _NUM_BINS - _FINGER_BINS + 1 + shift]
-    last_left = _HALF_BINS - _FINGER_BINS
-    left_gaps, right_gaps = gap[:, last_left::-1], gap[:, _HALF_BINS + 1 :]
-    left = _HALF_BINS - np.argmax(left_gaps, axis=1)
-    right = _HALF_BINS + np.argmax(right_gaps, axis=1)
-    return left, right, left_gaps.any(axis=1) & right_gaps.any(axis=1)
 
 
 def _outline(heights: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
