@@ -15,3 +15,23 @@ class UnknownNameError(ModelsError, KeyError):
 
 class AssetError(ModelsError, ValueError):
     """A mesh, texture or description cannot be used as it is."""
+
+
+class ArrangementError(ModelsError, ValueError):
+    """A file that describes an arrangement of objects cannot be used as it is."""
+
+
+class ImportRefusedError(AssetError):
+    """Somebody else's object cannot be taken into a catalogue."""
+
+
+class WordsFileError(AssetError):
+    """A file of words does not say how people ask for the objects."""
+
+
+class CatalogueFolderError(AssetError):
+    """A folder is no catalogue, or an object in it is damaged."""
+
+
+class MissingPackageError(ModelsError, ImportError):
+    """A package that only this task needs is not installed."""

@@ -1,9 +1,10 @@
 """RGB-D views and an instruction in, a cloud with CLIP features in text space out.
 
-    from perception import MultiViewLifter, load_encoder
+    from perception import MultiViewLifter, fit_config, load_encoder, read_views
 
-    lifter = MultiViewLifter(load_encoder("embedded"))
-    percept = lifter.perceive(views, "give me the pear")
+    views = read_views("my_views")
+    scene = MultiViewLifter(load_encoder(), fit_config(views)).lift(views)
+    print(scene.query("red mug").point)
 
 The package stands alone: it knows nothing of simulators, robots or policies. Names are imported on
 first use, since Open3D, torch and open_clip take seconds to import.
@@ -17,13 +18,20 @@ if TYPE_CHECKING:
     from perception.encoders import available_encoders, encoder_weights_status, load_encoder
     from perception.encoders.base import Encoder, TextFeatures
     from perception.errors import PerceptionError
+    from perception.fitting import fit_config
     from perception.fusion import FusionConfig, fuse
     from perception.language import Instruction, parse_instruction
     from perception.lifter import LifterConfig, MultiViewLifter, Percept
     from perception.lifting import LiftingConfig, lift_features
+    from perception.readers import read_pair, read_views
+    from perception.readers.folder import save_views
+    from perception.readers.frames import ReadOptions
+    from perception.scene import Answer, LiftedScene
+    from perception.text_scores import TextScorer
     from perception.views import CameraView, Intrinsics
 
 _MODULE_OF = {
+    "Answer": "scene",
     "CameraView": "views",
     "Encoder": "encoders.base",
     "FeatureCloud": "cloud",
@@ -31,21 +39,29 @@ _MODULE_OF = {
     "GeometryCloud": "cloud",
     "Instruction": "language",
     "Intrinsics": "views",
+    "LiftedScene": "scene",
     "LifterConfig": "lifter",
     "LiftingConfig": "lifting",
     "MultiViewLifter": "lifter",
     "Percept": "lifter",
     "PerceptionError": "errors",
+    "ReadOptions": "readers.frames",
     "TextFeatures": "encoders.base",
+    "TextScorer": "text_scores",
     "available_encoders": "encoders",
     "encoder_weights_status": "encoders",
+    "fit_config": "fitting",
     "fuse": "fusion",
     "lift_features": "lifting",
     "load_encoder": "encoders",
     "parse_instruction": "language",
+    "read_pair": "readers",
+    "read_views": "readers",
+    "save_views": "readers.folder",
 }
 
 __all__ = [
+    "Answer",
     "CameraView",
     "Encoder",
     "FeatureCloud",
@@ -53,18 +69,25 @@ __all__ = [
     "GeometryCloud",
     "Instruction",
     "Intrinsics",
+    "LiftedScene",
     "LifterConfig",
     "LiftingConfig",
     "MultiViewLifter",
     "Percept",
     "PerceptionError",
+    "ReadOptions",
     "TextFeatures",
+    "TextScorer",
     "available_encoders",
     "encoder_weights_status",
+    "fit_config",
     "fuse",
     "lift_features",
     "load_encoder",
     "parse_instruction",
+    "read_pair",
+    "read_views",
+    "save_views",
 ]
 
 

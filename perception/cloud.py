@@ -1,6 +1,8 @@
 """The two clouds that perception hands out: fine geometry, and coarser points with features."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -8,6 +10,15 @@ from perception.arrays import checked_array
 from perception.errors import InvalidCloudError
 
 _UNIT_TOLERANCE = 1e-3
+_ROW_SHAPES: dict[str, tuple[int | str, ...]] = {
+    "points": (3,),
+    "colors": (3,),
+    "normals": (3,),
+    "features": ("C",),
+    "confidence": (),
+    "similarity": (),
+}
+FEATURE_CLOUD_ARRAYS = tuple(_ROW_SHAPES)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,6 +57,7 @@ class FeatureCloud:
         confidence: (N,) float32 in (0, 1], the weight of the views behind the features.
         similarity: (N,) float32, how well the point fits the text that was asked for; see
             `perception.similarity`.
+        encoder: Name of the encoder in whose text space the features lie; empty if unknown.
     """
 
     points: np.ndarray
@@ -54,20 +66,11 @@ class FeatureCloud:
     features: np.ndarray
     confidence: np.ndarray
     similarity: np.ndarray
+    encoder: str = ""
 
     def __post_init__(self) -> None:
         """Check the arrays and make them read-only."""
-        _check_arrays(
-            self,
-            {
-                "points": (3,),
-                "colors": (3,),
-                "normals": (3,),
-                "features": ("C",),
-                "confidence": (),
-                "similarity": (),
-            },
-        )
+        _check_arrays(self, _ROW_SHAPES)
         _check_unit(self, "normals")
         _check_unit(self, "features")
 
@@ -84,7 +87,40 @@ class FeatureCloud:
         Returns:
             A cloud of the chosen points, in the order of `indices`.
         """
-        return FeatureCloud(**{f.name: getattr(self, f.name)[indices] for f in fields(self)})
+        return replace(self, **{name: getattr(self, name)[indices] for name in _ROW_SHAPES})
+
+    def save(self, path: Path | str, *, ply_colors: Literal["similarity", "rgb"] = "rgb") -> None:
+        """Write the cloud: everything as .npz, or what viewers show as .ply.
+
+        Args:
+            path: File to write, .npz or .ply; one that exists is replaced.
+            ply_colors: Colour of the points of a .ply: as seen, or from blue (least similar) to
+                red (most similar).
+
+        Raises:
+            InvalidFileError: If the suffix is another one, or the file cannot be written.
+        """
+        from perception.cloud_files import save_cloud
+
+        save_cloud(self, Path(path), ply_colors=ply_colors)
+
+    @classmethod
+    def load(cls, path: Path | str) -> "FeatureCloud":
+        """Read a cloud that `save` wrote as .npz.
+
+        Args:
+            path: The file.
+
+        Returns:
+            The same cloud, bit by bit.
+
+        Raises:
+            MissingFileError: If there is no such file.
+            InvalidFileError: If it holds no cloud.
+        """
+        from perception.cloud_files import load_cloud
+
+        return load_cloud(Path(path))
 
 
 def _check_arrays(

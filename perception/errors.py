@@ -44,6 +44,22 @@ class InvalidWeightsError(PerceptionError, ValueError):
     """A weight file exists, but does not belong to the encoder that was asked for."""
 
 
+class MissingFileError(PerceptionError, FileNotFoundError):
+    """A file or folder that is to be read does not exist."""
+
+
+class InvalidFileError(PerceptionError, ValueError):
+    """A file exists, but one of its fields, or what it holds, cannot be used."""
+
+
+class UnknownLayoutError(PerceptionError, ValueError):
+    """A folder of views has a layout that no reader knows, or was asked to be read as one."""
+
+
+class InvalidOptionError(PerceptionError, ValueError):
+    """An option of a command line cannot be used as it is."""
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return `" Did you mean 'x'?"` for the closest known name, or an empty string.
 

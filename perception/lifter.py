@@ -13,11 +13,10 @@ from perception.errors import EmptyCloudError, InvalidConfigError
 from perception.fusion import FusionConfig, fuse, ordered_views
 from perception.language import parse_instruction
 from perception.lifting import LiftingConfig, lift_features
-from perception.similarity import relevancy
+from perception.scene import LiftedScene
+from perception.text_scores import DEFAULT_NEGATIVE_PROMPTS, DEFAULT_SHARPNESS, TextScorer
 from perception.views import CameraView
 from perception.voxels import voxel_means
-
-_NUM_CACHED_TEXTS = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +43,8 @@ class LifterConfig:
     table_height_m: float = 0.0
     table_margin_m: float = 0.003
     is_table_lifted: bool = False
-    negative_prompts: tuple[str, ...] = ("object", "table", "stuff", "surface", "background")
-    sharpness: float = 10.0
+    negative_prompts: tuple[str, ...] = DEFAULT_NEGATIVE_PROMPTS
+    sharpness: float = DEFAULT_SHARPNESS
     num_cached_images: int = 12
 
     def __post_init__(self) -> None:
@@ -82,7 +81,7 @@ class Percept:
 
 
 class MultiViewLifter:
-    """Turns RGB-D views and an instruction into a `Percept`.
+    """Turns RGB-D views into a `LiftedScene`, or views and an instruction into a `Percept`.
 
     The clouds of the last scene, the feature maps of the last images and the last texts are
     remembered: another question about the same views costs little more than encoding its text.
@@ -98,11 +97,31 @@ class MultiViewLifter:
         self.encoder = encoder
         self.config = config or LifterConfig()
         self._maps: LruCache[Tensor] = LruCache(self.config.num_cached_images)
-        self._texts: LruCache[TextFeatures] = LruCache(_NUM_CACHED_TEXTS)
+        self._scorer = TextScorer(
+            encoder,
+            negative_prompts=self.config.negative_prompts,
+            sharpness=self.config.sharpness,
+        )
         self._scenes: LruCache[tuple[GeometryCloud, FeatureCloud]] = LruCache(1)
 
+    def lift(self, views: Sequence[CameraView]) -> LiftedScene:
+        """Lift features onto the fused cloud of the views.
+
+        Args:
+            views: At least one view, under different names; their order does not matter.
+
+        Returns:
+            A scene that answers questions; another one costs only the text tower.
+
+        Raises:
+            InvalidViewError: If there is no view, or two share a name.
+            EmptyCloudError: If no point is left inside the workspace.
+        """
+        geometry, cloud = self._scene_clouds(ordered_views(views))
+        return LiftedScene(cloud=cloud, scorer=self._scorer, geometry=geometry)
+
     def perceive(self, views: Sequence[CameraView], instruction: str) -> Percept:
-        """Perceive a scene.
+        """Perceive a scene with respect to one instruction.
 
         Args:
             views: At least one view, under different names; their order does not matter.
@@ -113,33 +132,22 @@ class MultiViewLifter:
 
         Raises:
             InvalidViewError: If there is no view, or two share a name.
-            InvalidTextError: If the instruction holds no words.
+            InvalidTextError: If the instruction holds no words, or too many.
             EmptyCloudError: If no point is left inside the workspace.
         """
         target_phrase = parse_instruction(instruction).target_phrase
-        target_text = self._text_features(target_phrase)
+        # Texts before images: what is wrong with them shows at once.
+        target_text = self._scorer.encode(target_phrase)
+        text = self._scorer.encode(instruction)
         geometry, cloud = self._scene_clouds(ordered_views(views))
-        similarity = relevancy(
-            cloud.features,
-            target_text,
-            [self._text_features(prompt) for prompt in self.config.negative_prompts],
-            sharpness=self.config.sharpness,
-        )
+        similarity = self._scorer.score(cloud.features, target_phrase)
         return Percept(
             geometry=geometry,
             features=replace(cloud, similarity=similarity),
-            text=self._text_features(instruction),
+            text=text,
             target_text=target_text,
             target_phrase=target_phrase,
         )
-
-    def _text_features(self, text: str) -> TextFeatures:
-        key = f"{self.encoder.fingerprint}|{text}"
-        features = self._texts.get(key)
-        if features is None:
-            features = self.encoder.encode_text(text)
-            self._texts.put(key, features)
-        return features
 
     def _scene_clouds(self, views: Sequence[CameraView]) -> tuple[GeometryCloud, FeatureCloud]:
         key = "|".join([self.encoder.fingerprint, *map(hash_view, views)])
@@ -167,6 +175,7 @@ class MultiViewLifter:
             features=lifted.features[is_seen],
             confidence=lifted.confidence[is_seen],
             similarity=np.zeros(int(is_seen.sum()), np.float32),
+            encoder=self.encoder.name,
         )
         return geometry, cloud
 

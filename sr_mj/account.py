@@ -21,10 +21,9 @@ _PHRASES = {
 
 def describe_scene(scene: Scene) -> str:
     """Introduce a scene in two lines."""
-    config = scene.config
     num = len(scene.objects)
     return (
-        f"Scene  {config.scene} ({config.split}, seed {config.seed}), "
+        f"Scene  {scene.config.title}, "
         f"{num} object{'' if num == 1 else 's'}\n"
         f"Goal   {scene.goal.text!r}"
     )
@@ -121,6 +120,7 @@ def episode_record(scene: Scene, attempts: list[Attempt], max_attempts: int) -> 
     """Return the whole episode as plain JSON values."""
     return {
         "scene": scene.config.scene,
+        "arrangement": None if scene.config.arranged is None else scene.config.arranged.name,
         "split": scene.config.split,
         "seed": scene.config.seed,
         "goal": scene.goal.text,

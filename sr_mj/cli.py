@@ -11,6 +11,11 @@ Config = TypeVar("Config")
 
 USAGE_ERROR = 2
 
+_SIM_PACKAGES = (
+    *("daqp", "dm_control", "imageio", "jsonschema", "lxml", "manifold3d"),
+    *("mink", "mujoco", "shapely", "trimesh"),
+)
+
 
 def run_command(config_type: type[Config], body: Callable[[Config], int], description: str) -> None:
     """Parse the arguments, run the command, and exit with its status.
@@ -32,6 +37,11 @@ def run_command(config_type: type[Config], body: Callable[[Config], int], descri
 
     try:
         status = body(config)
+    except ModuleNotFoundError as error:
+        if error.name not in _SIM_PACKAGES:
+            raise
+        print(f"error: {error.name} is not installed; pip install 'sr-mj[sim]'", file=sys.stderr)
+        status = USAGE_ERROR
     except (SrMjError, ModelsError, PerceptionError, PolicyError) as error:
         print(f"error: {error}", file=sys.stderr)
         status = USAGE_ERROR

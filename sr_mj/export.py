@@ -19,7 +19,7 @@ from sr_mj.cli import run_command
 from sr_mj.errors import ConfigError
 
 if TYPE_CHECKING:
-    from sr_mj.scene import Scene
+    from sr_mj.scene import Scene, SceneConfig
 
 XML_NAME = "scene.xml"
 ASSET_FOLDER = "assets"
@@ -53,11 +53,14 @@ class ExportConfig:
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
     """Folder to create."""
     scene: str = "cluttered15"
-    """Kind of scene: cluttered15, place8, pickplace8, single or empty."""
+    """Kind of scene (cluttered15, place8, pickplace8, heavy30, single, empty), or a fixed
+    arrangement such as place-seen-03."""
     split: str = "seen"
     """Objects to use: seen or unseen."""
     seed: int = 0
-    """Draws objects, arrangement and goal."""
+    """Draws objects, how they fall, and goal."""
+    objects: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder of objects made by `python -m models.import_objects`, to use instead of ours."""
     goal: str | None = None
     """Instruction in free words; drawn from templates by default."""
     cameras: str = "sr"
@@ -96,12 +99,14 @@ def scene_description(scene: "Scene") -> dict[str, Any]:
 
     qpos = scene.settled_qpos
     return {
-        "config": asdict(scene.config),
+        "config": _config_record(scene.config),
         "goal": scene.goal.text,
         "targets": list(scene.goal.targets),
+        "place": None if scene.goal.place is None else asdict(scene.goal.place),
         "objects": [
             {
                 "name": item.name,
+                "object": item.asset.name,
                 "body": f"{item.name}/",
                 "words": asdict(item.words),
                 "mass_kg": item.asset.mass_kg,
@@ -123,6 +128,16 @@ def scene_description(scene: "Scene") -> dict[str, Any]:
         "versions": package_versions(),
         "git_revision": git_revision(),
     }
+
+
+def _config_record(config: "SceneConfig") -> dict[str, Any]:
+    """Write a configuration as JSON values; an arrangement by its name."""
+    from dataclasses import asdict
+
+    plain = asdict(config)
+    plain["arrangement"] = None if config.arranged is None else config.arranged.name
+    plain["catalogue"] = None if config.catalogue is None else str(config.catalogue)
+    return plain
 
 
 def export_scene(scene: "Scene", out: Path) -> None:
@@ -150,9 +165,8 @@ def export_scene(scene: "Scene", out: Path) -> None:
             (folder / ASSET_FOLDER / name).write_bytes(content)
         description = json.dumps(scene_description(scene), indent=2)
         (folder / "scene.json").write_text(description + "\n")
-        config = scene.config
         readme = _README.format(
-            title=f"{config.scene}, {config.split} objects, seed {config.seed}",
+            title=scene.config.title,
             version=versions["sr-mj"],
             xml=XML_NAME,
             keyframe=KEYFRAME,
@@ -166,15 +180,16 @@ def export_scene(scene: "Scene", out: Path) -> None:
 
 def export(config: ExportConfig) -> int:
     """Make a scene and export it; returns exit status 0."""
-    from sr_mj.scene import SceneConfig, make_scene
+    from sr_mj.scene import make_scene, scene_config
 
     scene = make_scene(
-        SceneConfig(
-            scene=config.scene,
-            split=config.split,  # pyright: ignore[reportArgumentType]  # checked there
+        scene_config(
+            config.scene,
+            split=config.split,
             seed=config.seed,
             goal=config.goal,
             cameras=config.cameras,
+            catalogue=config.objects,
         )
     )
     export_scene(scene, config.out)

@@ -1,6 +1,8 @@
 """The main command: make a scene, look, decide, act, until the goal is met.
 
     python -m sr_mj.run --scene cluttered15 --goal "give me the banana"
+    python -m sr_mj.run --scene grasp-seen-03
+    python -m sr_mj.run --cases testing_cases/
 
 Prints an account of every attempt and one line of result. The seed decides everything: the same
 seed on the same machine gives the same account, times aside.
@@ -20,6 +22,7 @@ from sr_mj.cli import run_command
 from sr_mj.errors import ConfigError
 
 if TYPE_CHECKING:
+    from perception.lifter import MultiViewLifter
     from sr_mj.episode import Attempt
     from sr_mj.scene import Scene, SceneConfig
 
@@ -31,11 +34,17 @@ class RunConfig:
     """Options of `python -m sr_mj.run`."""
 
     scene: str = "cluttered15"
-    """Kind of scene: cluttered15, place8, pickplace8, single or empty."""
+    """Kind of scene (cluttered15, place8, pickplace8, heavy30, single, empty), or a fixed
+    arrangement such as grasp-seen-03."""
     split: str = "seen"
     """Objects to use: seen or unseen."""
     seed: int = 0
-    """Draws objects, arrangement, goal, sensor noise and candidates."""
+    """Draws objects, how they fall, goal, sensor noise and candidates."""
+    cases: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    """Test cases of Vision-Language-Grasping or A2 to run one after another: a text file, a folder
+    of them, or a JSON list. Takes the place of --scene."""
+    objects: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder of objects made by `python -m models.import_objects`, to use instead of ours."""
     goal: str | None = None
     """Instruction in free words, such as "give me the banana"; drawn from templates by default."""
     policy: str = "grounding"
@@ -76,23 +85,36 @@ def _check(config: RunConfig) -> None:
         )
 
 
-def _scene_config(config: RunConfig) -> "SceneConfig":
-    from sr_mj.scene import SceneConfig
+def _scene_configs(config: RunConfig) -> "tuple[SceneConfig, ...]":
+    """Say which scenes to run, in turn."""
+    from models.arrangements.cases import read_cases
+    from models.objects.catalogue import open_catalogue
+    from sr_mj.scene import SceneConfig, scene_config
 
-    return SceneConfig(
-        scene=config.scene,
-        split=config.split,  # pyright: ignore[reportArgumentType]  # checked there
-        seed=config.seed,
-        goal=config.goal,
-        cameras=config.cameras,
-    )
+    options: dict[str, Any] = {
+        "seed": config.seed,
+        "cameras": config.cameras,
+        "catalogue": config.objects,
+    }
+    if config.cases is None:
+        scene = scene_config(config.scene, split=config.split, goal=config.goal, **options)
+        if scene.arranged is not None and scene.arranged.suite == "place":
+            raise ConfigError(
+                f"Arrangement {config.scene!r} asks for placing only, which is not carried out "
+                "yet; choose a grasp or pick-place arrangement, or export this one."
+            )
+        return (scene,)
+    if config.goal is not None:
+        raise ConfigError("Test cases bring their own goals; leave --goal or --cases out.")
+    cases = read_cases(config.cases, open_catalogue(config.objects), split=config.split)
+    return tuple(SceneConfig(arrangement=case, **options) for case in cases)
 
 
 class _Reporter:
     """Prints the account as it happens and keeps it in the output folder."""
 
-    def __init__(self, config: RunConfig, scene: "Scene") -> None:
-        self._config, self._scene = config, scene
+    def __init__(self, config: RunConfig, scene: "Scene", out: Path | None) -> None:
+        self._config, self._scene, self._out = config, scene, out
         self.attempts: list[Attempt] = []
 
     def begin(self) -> None:
@@ -100,15 +122,15 @@ class _Reporter:
         from sr_mj.provenance import git_revision, package_versions, to_json
 
         config = self._config
-        if config.out is not None:
-            config.out.mkdir(parents=True, exist_ok=True)
+        if self._out is not None:
+            self._out.mkdir(parents=True, exist_ok=True)
             about = {
                 "config": config,
                 "goal": self._scene.goal.text,
                 "git_revision": git_revision(),
                 "versions": package_versions(),
             }
-            (config.out / "run.json").write_text(to_json(about))
+            (self._out / "run.json").write_text(to_json(about))
         if not config.json:
             print(describe_scene(self._scene))
             note = " (reads ground truth)" if config.policy == "oracle" else ""
@@ -121,18 +143,18 @@ class _Reporter:
         self.attempts.append(attempt)
         if not self._config.json:
             print(describe_attempt(attempt, verbose=self._config.verbose), flush=True)
-        if self._config.out is not None:
-            with (self._config.out / "attempts.jsonl").open("a") as file:
+        if self._out is not None:
+            with (self._out / "attempts.jsonl").open("a") as file:
                 file.write(json.dumps(attempt_record(attempt)) + "\n")
-            save_pictures(attempt, self._config.out)
+            save_pictures(attempt, self._out)
 
     def finish(self, seconds: float) -> None:
         from sr_mj.account import describe_result, episode_record
 
         record: dict[str, Any] = episode_record(self._scene, self.attempts, self._config.attempts)
         record["seconds"] = round(seconds, 2)
-        if self._config.out is not None:
-            (self._config.out / "result.json").write_text(json.dumps(record, indent=2) + "\n")
+        if self._out is not None:
+            (self._out / "result.json").write_text(json.dumps(record, indent=2) + "\n")
         if self._config.json:
             print(json.dumps(record))
         else:
@@ -141,7 +163,7 @@ class _Reporter:
 
 
 def run(config: RunConfig) -> int:
-    """Run one episode.
+    """Run one episode, or one for each test case.
 
     Args:
         config: Options.
@@ -155,32 +177,53 @@ def run(config: RunConfig) -> int:
 
     # Before anything imports dm_control, which binds OpenGL to one library for good.
     select_backend()
-    from sr_mj.assemble import assembled, check_policy_name, lifter_for, make_policy
-    from sr_mj.episode import run_episode
-    from sr_mj.scene import make_scene
-    from sr_mj.video import VideoRecorder, check_video_path
+    from sr_mj.assemble import check_policy_name, lifter_for
+    from sr_mj.video import check_video_path
 
     # Mistakes first: nothing is made before every name is known to exist.
-    scene_config = _scene_config(config)
+    scenes = _scene_configs(config)
     check_policy_name(config.policy)
     if config.record is not None:
         check_video_path(config.record)
     lifter = lifter_for(
-        scene_config.kind.workspace, config.encoder, allow_download=config.allow_download
+        scenes[0].kind.workspace, config.encoder, allow_download=config.allow_download
     )
+    successes = 0
+    for scene_config in scenes:
+        successes += _run_episode(config, scene_config, lifter, is_one_of_many=len(scenes) > 1)
+    if len(scenes) > 1 and not config.json:
+        seconds = time.perf_counter() - start
+        print(f"Cases  {successes} of {len(scenes)} succeeded [{seconds:.1f} s]")
+    return 0
+
+
+def _run_episode(
+    config: RunConfig, scene_config: "SceneConfig", lifter: "MultiViewLifter", is_one_of_many: bool
+) -> bool:
+    """Run one episode, report it, and say whether it succeeded."""
+    from sr_mj.assemble import assembled, make_policy
+    from sr_mj.episode import run_episode
+    from sr_mj.scene import make_scene
+    from sr_mj.video import VideoRecorder
+
+    start = time.perf_counter()
     scene = make_scene(scene_config)
     policy = make_policy(config.policy, scene, config.checkpoint)
-    reporter = _Reporter(config, scene)
+    out, record = config.out, config.record
+    if is_one_of_many:
+        out = out and out / scene_config.title
+        record = record and record.with_stem(f"{record.stem}-{scene_config.title}")
+    reporter = _Reporter(config, scene, out)
     reporter.begin()
     with contextlib.ExitStack() as stack:
-        film = config.record and stack.enter_context(VideoRecorder(scene, config.record))
+        film = record and stack.enter_context(VideoRecorder(scene, record))
         pipeline = stack.enter_context(
             assembled(scene, lifter=lifter, policy=policy, on_step=film or None)
         )
         for attempt in run_episode(scene, pipeline, seed=config.seed, max_attempts=config.attempts):
             reporter.add(attempt)
     reporter.finish(time.perf_counter() - start)
-    return 0
+    return bool(reporter.attempts and reporter.attempts[-1].outcome.success)
 
 
 def main() -> None:

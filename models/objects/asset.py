@@ -73,7 +73,7 @@ class ObjectAsset:
     Attributes:
         name: Name in the catalogue.
         family: Name of the function that shaped it.
-        split: "seen" or "unseen".
+        split: "seen", "unseen", or "sampled" for a variant drawn at random.
         words: How people ask for it.
         vertices: (V, 3) float64, metres.
         faces: (F, 3) int32, counter-clockwise seen from outside.

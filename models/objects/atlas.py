@@ -1,11 +1,14 @@
 """Panels, the painted pieces of an object's surface, and the atlas that joins their images."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from models.errors import AssetError
-from models.objects.surface import Surface, join
+from models.objects.surface import Surface, join, rounded_box
 
 ATLAS_PX = 512
 # Texels repeated around every image, so that filtering never mixes in a neighbour.
@@ -39,6 +42,32 @@ class Solid:
     def of(cls, surface: Surface, image: np.ndarray) -> "Solid":
         """Wrap one closed surface with one image."""
         return cls(panels=(Panel(surface=surface, image=image),))
+
+
+def box_solid(
+    size: ArrayLike,
+    radius_m: float,
+    images: np.ndarray | Sequence[np.ndarray],
+    center: ArrayLike = (0, 0, 0),
+    rotation: Rotation | None = None,
+) -> Solid:
+    """Make a box with rounded edges.
+
+    Args:
+        size: Extents along x, y and z, metres.
+        radius_m: Radius of the edges.
+        images: One image for all sides, or six in the order of `rounded_box`.
+        center: Where its centre goes, metres.
+        rotation: Turn about its centre.
+
+    Returns:
+        The solid.
+    """
+    painted = [images] * 6 if isinstance(images, np.ndarray) else images
+    sides = zip(rounded_box(size, radius_m), painted, strict=True)
+    return Solid(
+        panels=tuple(Panel(surface=s.moved(center, rotation), image=image) for s, image in sides)
+    )
 
 
 def _shelve(sizes: list[tuple[int, int]]) -> list[tuple[int, int]]:

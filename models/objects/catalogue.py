@@ -8,13 +8,92 @@ Example:
 
 import difflib
 import functools
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, Union
 
 from models.errors import UnknownNameError
 from models.objects.asset import ObjectAsset, assemble
 from models.objects.entry import Entry
 from models.objects.words import ObjectWords
 
+if TYPE_CHECKING:
+    from models.objects.mjcf_object import MjcfObject
+
+    CatalogueObject = Union[ObjectAsset, MjcfObject]  # noqa: UP007  # one is only imported here
+
 SPLITS = ("seen", "unseen")
+
+
+class Catalogue(Protocol):
+    """Where a scene's objects come from: the built-in catalogue, or a folder of imported ones.
+
+    Attributes:
+        source: What to call it in messages.
+    """
+
+    source: str
+
+    def names(self, split: str | None = None) -> tuple[str, ...]:
+        """List the objects of a split, or all; a folder has no splits and always lists all."""
+        ...
+
+    def words(self, name: str) -> ObjectWords:
+        """Return the words of an object; `UnknownNameError` if there is no such object."""
+        ...
+
+    def load(self, name: str) -> "CatalogueObject":
+        """Return an object; `UnknownNameError` if there is no such object."""
+        ...
+
+    def by_graspnet_id(self, graspnet_id: str) -> str | None:
+        """Return the name of the object that stands for an id of GraspNet-1Billion, if any."""
+        ...
+
+
+class BuiltInCatalogue:
+    """The objects made by code in this package."""
+
+    source = "the built-in catalogue"
+
+    def names(self, split: str | None = None) -> tuple[str, ...]:
+        """List names; see `object_names`."""
+        return object_names(split)
+
+    def words(self, name: str) -> ObjectWords:
+        """Return words; see `object_words`."""
+        return object_words(name)
+
+    def load(self, name: str) -> ObjectAsset:
+        """Return an object; see `load_object`."""
+        return load_object(name)
+
+    def by_graspnet_id(self, graspnet_id: str) -> str | None:
+        """Return the name of our stand-in; None for an id that GraspNet-1Billion does not have."""
+        from models.objects.graspnet import stand_in
+
+        try:
+            return stand_in(graspnet_id).object_name
+        except UnknownNameError:
+            return None
+
+
+def open_catalogue(folder: Path | None = None) -> Catalogue:
+    """Open the built-in catalogue, or a folder made by `python -m models.import_objects`.
+
+    Args:
+        folder: The folder; None for the built-in catalogue.
+
+    Returns:
+        The catalogue.
+
+    Raises:
+        AssetError: If the folder is not a catalogue.
+    """
+    if folder is None:
+        return BuiltInCatalogue()
+    from models.objects.folder_catalogue import FolderCatalogue
+
+    return FolderCatalogue(folder)
 
 
 @functools.cache

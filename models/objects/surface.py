@@ -221,6 +221,23 @@ def plate(
     return skin(rings).planar_uv()
 
 
+def refined(outline: np.ndarray, step_m: float) -> np.ndarray:
+    """Insert points into the edges of a polygon, so that a fan over it has no slivers.
+
+    Args:
+        outline: (M, 2) polygon, metres.
+        step_m: Spacing of the points, about.
+
+    Returns:
+        (N, 2) the same polygon with more points.
+    """
+    points = []
+    for start, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        num = max(1, int(np.linalg.norm(end - start) / step_m))
+        points += [start + (end - start) * k / num for k in range(num)]
+    return np.array(points)
+
+
 def disc(ring: np.ndarray, *, faces_up: bool) -> Surface:
     """Fill a flat ring of (M, 3) points, counter-clockwise seen from above, with a fan.
 
@@ -231,7 +248,7 @@ def disc(ring: np.ndarray, *, faces_up: bool) -> Surface:
     return skin(rings).planar_uv()
 
 
-def rounded_box(size: ArrayLike, radius_m: float, *, num_round: int = 3) -> list[Surface]:
+def rounded_box(size: ArrayLike, radius_m: float, *, num_round: int = 4) -> list[Surface]:
     """Build the six sides of a box with rounded edges, centred on the origin.
 
     Args:

@@ -1,27 +1,29 @@
-"""`SceneConfig` -> `Scene`: draws the objects, composes, lets them settle, draws the goal."""
+"""`SceneConfig` -> `Scene`: lays out the objects, lets them settle, draws the goal."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 from dm_control import mjcf
-from scipy.spatial.transform import Rotation
 
+from models.arrangements.paraphrases import wordings
 from models.gripper_geometry import ROBOTIQ_2F85_CLASS
-from models.objects.asset import ObjectAsset
-from models.objects.catalogue import load_object, object_names
 from models.objects.words import ObjectWords
 from models.workspace import Workspace
 from sr_mj.errors import SceneError
-from sr_mj.scene.compose import OBJECT_BODY, ComposedScene, compose_scene, home_state
-from sr_mj.scene.config import SceneConfig, SceneKind
-from sr_mj.scene.goals import Goal, draw_goal, find_targets
-from sr_mj.scene.settle import DROP_HEIGHT_M, Drop, FreeBody, Settler, heap_drop
+from sr_mj.scene.arranged import arrange, arranged_goal
+from sr_mj.scene.compose import OBJECT_BODY, compose_scene
+from sr_mj.scene.config import SceneConfig
+from sr_mj.scene.goals import Goal, draw_goal, find_goal
+from sr_mj.scene.layout import Layout, draw_drops, draw_objects, fall, state_at_rest, stays
+from sr_mj.scene.settle import FreeBody
+
+if TYPE_CHECKING:
+    from models.objects.catalogue import CatalogueObject
 
 _LAYOUT_TRIES = 20
 _LAYOUTS_PER_DRAW = 4
-_SPACING_TRIES = 2000
-_SET_DOWN_M = 0.01
 _GRASP_MARGIN_M = 0.008
 _RIM_CATEGORIES = ("container", "cup")
 
@@ -31,20 +33,20 @@ class SceneObject:
     """An object in a scene.
 
     Attributes:
-        asset: Geometry and physics.
+        asset: Geometry and physics; `asset.name` is its name in the catalogue.
         body: Its place in the model.
         graspable: The gripper can hold it as it lay when the scene was made: its narrowest width
             seen from above fits, or it stands with an open rim upwards. Sufficient, not necessary.
     """
 
-    asset: ObjectAsset
+    asset: "CatalogueObject"
     body: FreeBody
     graspable: bool
 
     @property
     def name(self) -> str:
-        """Name in the catalogue."""
-        return self.asset.name
+        """Name in the scene: that of the catalogue, numbered where an object occurs twice."""
+        return self.body.name
 
     @property
     def words(self) -> ObjectWords:
@@ -104,106 +106,26 @@ def narrowest_width(vertices: np.ndarray) -> float:
     return float(extents.min())
 
 
-def _is_graspable(asset: ObjectAsset, rotation: np.ndarray) -> bool:
+def _is_graspable(asset: "CatalogueObject", rotation: np.ndarray) -> bool:
+    """Tell whether the gripper can hold an object that is turned by `rotation` (3, 3)."""
     width = narrowest_width(asset.vertices @ rotation.T)
     upright_rim = asset.words.category in _RIM_CATEGORIES and rotation[2, 2] > 0.9
     return upright_rim or width < ROBOTIQ_2F85_CLASS.max_width_m - _GRASP_MARGIN_M
 
 
-def _draw_assets(config: SceneConfig, rng: np.random.Generator) -> list[ObjectAsset]:
-    wanted = config.kind.num_objects
-    if config.objects:
-        if len(config.objects) != wanted:
-            raise SceneError(
-                f"Scene {config.scene!r} has {wanted} objects, got {len(config.objects)} names; "
-                "name as many as it has, or none."
-            )
-        return [load_object(name) for name in config.objects]
-    names = object_names(config.split)
-    if len(names) < wanted:
-        raise SceneError(
-            f"Scene {config.scene!r} needs {wanted} objects, split {config.split!r} has "
-            f"{len(names)}; choose a smaller scene."
-        )
-    return [load_object(names[i]) for i in rng.choice(len(names), size=wanted, replace=False)]
-
-
-def _spread_centers(kind: SceneKind, rng: np.random.Generator) -> np.ndarray:
-    """Draw (num_spread, 2) centres with the least spacing between any two, metres."""
-    centers: list[np.ndarray] = []
-    # A centimetre of reserve: objects rock a little when they are set down.
-    spacing = kind.min_spacing_m + 0.01
-    for _ in range(_SPACING_TRIES):
-        if len(centers) == kind.num_spread:
-            return np.array(centers).reshape(-1, 2)
-        center = rng.uniform(kind.spread_lower, kind.spread_upper)
-        if all(np.linalg.norm(center - other) >= spacing for other in centers):
-            centers.append(center)
-    raise SceneError(
-        f"Found no room for {kind.num_spread} objects {spacing} m apart; use fewer objects or a "
-        "larger workspace."
-    )
-
-
-def _set_down(body: FreeBody, center: np.ndarray, rng: np.random.Generator) -> Drop:
-    quat = Rotation.from_euler("z", rng.uniform(-np.pi, np.pi)).as_quat(scalar_first=True)
-    position = np.array([*center, body.bottom_m + _SET_DOWN_M])
-    return Drop(position=position, quat_wxyz=quat)
-
-
-def _spread_apart(data: mujoco.MjData, bodies: tuple[FreeBody, ...], spacing_m: float) -> bool:
-    xy = np.array([data.xipos[body.body_id][:2] for body in bodies]).reshape(-1, 2)
-    gaps = np.linalg.norm(xy[:, None] - xy[None], axis=-1)[np.triu_indices(len(bodies), 1)]
-    return bool(np.all(gaps >= spacing_m))
-
-
-def _settle(
-    composed: ComposedScene, kind: SceneKind, rng: np.random.Generator
-) -> np.ndarray | None:
-    """Drop everything; return the state (nq,) at rest, or None if the spacing was lost."""
-    data = home_state(composed.model)
-    if not composed.bodies:
-        return data.qpos.copy()
-    spread, heaped = composed.bodies[: kind.num_spread], composed.bodies[kind.num_spread :]
-    settler = Settler(composed.model, data, composed.bodies, kind.workspace)
-    for body, center in zip(spread, _spread_centers(kind, rng), strict=True):
-        settler.drop(body, _set_down(body, center, rng))
-    for body in heaped:
-        settler.drop(
-            body, heap_drop(kind.heap_center, kind.heap_half_m, rng, DROP_HEIGHT_M + body.radius_m)
-        )
-    if heaped:
-        settler.recover(kind.heap_center, kind.heap_half_m, rng)
-    else:
-        settler.wait_until_calm()
-    stays = not settler.outside() and _spread_apart(data, spread, kind.min_spacing_m)
-    return data.qpos.copy() if stays else None
-
-
-def _reset_to(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
-    """Return a fresh state at rest; robot exactly at home, objects where they lie."""
-    data = home_state(model)
-    objects = np.arange(model.nq) >= model.nq - 7 * int(np.sum(model.jnt_type == 0))
-    data.qpos[objects] = qpos[objects]
-    mujoco.mj_forward(model, data)
-    return data
-
-
-def _placed_objects(
-    assets: list[ObjectAsset], bodies: tuple[FreeBody, ...], data: mujoco.MjData
-) -> tuple[SceneObject, ...]:
+def _placed_objects(layout: Layout, data: mujoco.MjData) -> tuple[SceneObject, ...]:
     return tuple(
         SceneObject(
             asset=asset,
             body=body,
             graspable=_is_graspable(asset, data.xmat[body.body_id].reshape(3, 3)),
         )
-        for asset, body in zip(assets, bodies, strict=True)
+        for asset, body in zip(layout.assets, layout.composed.bodies, strict=True)
     )
 
 
 def make_scene(config: SceneConfig) -> Scene:
-    """Make a scene: draw objects, compose, drop them, let them settle, draw the goal.
+    """Make a scene: draw objects or take those arranged, let them settle, draw the goal.
 
     Args:
         config: What to make.
@@ -213,26 +135,15 @@ def make_scene(config: SceneConfig) -> Scene:
 
     Raises:
         SceneError: If the objects will not settle in the workspace, or no goal can be drawn.
+        UnknownNameError: If an object does not exist.
     """
     draw_rng, settle_rng, goal_rng = np.random.default_rng(config.seed).spawn(3)
-    for attempt in range(_LAYOUT_TRIES):
-        if attempt % _LAYOUTS_PER_DRAW == 0:
-            assets = _draw_assets(config, draw_rng)
-            composed = compose_scene(assets, config.cameras)
-        qpos = _settle(composed, config.kind, settle_rng)
-        if qpos is None:
-            continue
-        data = _reset_to(composed.model, qpos)
-        objects = _placed_objects(assets, composed.bodies, data)
-        # A goal can only be drawn if something can be held as it came to lie.
-        if config.goal is not None or not objects or any(item.graspable for item in objects):
-            break
-    else:
-        raise SceneError(
-            f"{_LAYOUT_TRIES} layouts of scene {config.scene!r} with seed {config.seed} fell over, "
-            "too close together, or with nothing that the gripper can hold; use another seed or "
-            "other objects."
-        )
+    layout = (
+        _random_layout(config, draw_rng, settle_rng) if config.arranged is None else arrange(config)
+    )
+    composed = layout.composed
+    data = state_at_rest(composed.model, layout.qpos)
+    objects = _placed_objects(layout, data)
     settled = data.qpos.copy()
     settled.setflags(write=False)
     return Scene(
@@ -246,12 +157,41 @@ def make_scene(config: SceneConfig) -> Scene:
     )
 
 
+def _random_layout(
+    config: SceneConfig, draw_rng: np.random.Generator, settle_rng: np.random.Generator
+) -> Layout:
+    """Draw layouts until one stays, and has something in it that can be held."""
+    for attempt in range(_LAYOUT_TRIES):
+        if attempt % _LAYOUTS_PER_DRAW == 0:
+            assets = draw_objects(config, draw_rng)
+            composed = compose_scene(assets, config.cameras)
+        drops = draw_drops(composed.bodies, config.kind, settle_rng)
+        qpos = fall(composed, drops, config.kind, settle_rng)
+        if not stays(composed, qpos, config.kind):
+            continue
+        layout = Layout(assets=assets, composed=composed, qpos=qpos, drops=drops)
+        objects = _placed_objects(layout, state_at_rest(composed.model, qpos))
+        # A goal can only be drawn if something can be held as it came to lie.
+        if config.goal is not None or not objects or any(item.graspable for item in objects):
+            return layout
+    raise SceneError(
+        f"{_LAYOUT_TRIES} layouts of scene {config.scene!r} with seed {config.seed} fell over, "
+        "too close together, or with nothing that the gripper can hold; use another seed or "
+        "other objects."
+    )
+
+
 def _choose_goal(
     config: SceneConfig, objects: tuple[SceneObject, ...], rng: np.random.Generator
 ) -> Goal:
     words = {item.name: item.words for item in objects}
+    if config.arranged is not None:
+        goal = arranged_goal(config.arranged)
+        # Other wordings of an arrangement's goal mean the same objects.
+        if config.goal is None or config.goal in wordings(goal.text):
+            return replace(goal, text=config.goal or goal.text)
     if config.goal is not None:
-        return Goal(text=config.goal, targets=find_targets(config.goal, words))
+        return find_goal(config.goal, words)
     if not objects:
         return Goal(text="", targets=())
     return draw_goal(words, [item.name for item in objects if item.graspable], rng)

@@ -2,19 +2,23 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 from dm_control import mjcf
 
+from models.arrangements.arrangement import instance_names
 from models.camera_mjcf import add_cameras
 from models.cameras import OVERVIEW, camera_preset
-from models.objects.asset import ObjectAsset
 from models.objects.mjcf_builder import build_object
 from models.robot import ARM_ACTUATORS, ARM_JOINTS, attach_robot
 from models.tabletop import build_tabletop
 from models.ur5 import HOME_QPOS
 from sr_mj.scene.settle import FreeBody
+
+if TYPE_CHECKING:
+    from models.objects.catalogue import CatalogueObject
 
 OBJECT_BODY = "object"
 """Name of the body in every object's tree."""
@@ -49,12 +53,12 @@ def compile_mjcf(root: mjcf.RootElement) -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
 
 
-def _free_body(model: mujoco.MjModel, asset: ObjectAsset) -> FreeBody:
+def _free_body(model: mujoco.MjModel, name: str, asset: "CatalogueObject") -> FreeBody:
     # dm_control attaches through a frame body, which carries the joint; the object is its child.
-    joint = model.joint(int(model.body(f"{asset.name}/").jntadr[0]))
+    joint = model.joint(int(model.body(f"{name}/").jntadr[0]))
     return FreeBody(
-        name=asset.name,
-        body_id=model.body(f"{asset.name}/{OBJECT_BODY}").id,
+        name=name,
+        body_id=model.body(f"{name}/{OBJECT_BODY}").id,
         qpos_adr=int(joint.qposadr[0]),
         dof_adr=int(joint.dofadr[0]),
         bottom_m=-float(asset.vertices[:, 2].min()),
@@ -63,12 +67,13 @@ def _free_body(model: mujoco.MjModel, asset: ObjectAsset) -> FreeBody:
 
 
 def compose_scene(
-    assets: Sequence[ObjectAsset], cameras: str, model_name: str = "scene"
+    assets: "Sequence[CatalogueObject]", cameras: str, model_name: str = "scene"
 ) -> ComposedScene:
     """Compose and compile a scene.
 
     Args:
-        assets: The objects; their names become prefixes (`apple/`).
+        assets: The objects; their names become prefixes (`apple/`), numbered where one occurs
+            more than once (`apple_2/`).
         cameras: Camera preset.
         model_name: Name of the MJCF model.
 
@@ -79,14 +84,14 @@ def compose_scene(
     root = build_tabletop(model_name)
     attach_robot(root)
     add_cameras(root, (*camera_preset(cameras), OVERVIEW))
-    for index, asset in enumerate(assets):
-        frame = root.attach(build_object(asset, name=asset.name))
+    names = instance_names(asset.name for asset in assets)
+    for index, (name, asset) in enumerate(zip(names, assets, strict=True)):
+        frame = root.attach(build_object(asset, name=name))
         frame.pos = (0.5, 0, _WAITING_HEIGHT_M + index * _WAITING_GAP_M)
         frame.add("freejoint")
     model = compile_mjcf(root)
-    return ComposedScene(
-        root=root, model=model, bodies=tuple(_free_body(model, asset) for asset in assets)
-    )
+    bodies = (_free_body(model, name, asset) for name, asset in zip(names, assets, strict=True))
+    return ComposedScene(root=root, model=model, bodies=tuple(bodies))
 
 
 def home_state(model: mujoco.MjModel) -> mujoco.MjData:

@@ -1,8 +1,11 @@
 """What a scene is made from: the registry of kinds of scene, and the configuration of one."""
 
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
+from models.arrangements.arrangement import Arrangement
+from models.arrangements.library import arrangement_names, load_arrangement, summary
 from models.cameras import camera_preset
 from models.workspace import GRASP_WORKSPACE, PICK_PLACE_WORKSPACE, Workspace
 from sr_mj.errors import ConfigError, UnknownNameError, unknown_name_message
@@ -56,6 +59,7 @@ SCENE_KINDS: dict[str, SceneKind] = {
         spread_upper=(0.67, 0.26),
         description="5 objects heaped in the grasp zone (y < 0), 3 set apart in the place zone",
     ),
+    "heavy30": SceneKind(num_heaped=30, description="30 objects dropped at random, stacked"),
     "single": SceneKind(num_heaped=1, heap_half_m=0.08, description="one object alone"),
     "empty": SceneKind(description="robot, table and bin without objects"),
 }
@@ -66,17 +70,22 @@ class SceneConfig:
     """One scene, completely determined: the same configuration gives the same bytes.
 
     Attributes:
-        scene: Kind of scene, one of `SCENE_KINDS`.
-        split: Which part of the catalogue the objects come from.
-        seed: Draws the objects, how they fall, and the goal.
-        goal: The instruction; drawn from the protocol's templates when None.
+        scene: Kind of scene, one of `SCENE_KINDS`; that of the arrangement if there is one.
+        split: Which part of the catalogue the objects come from; that of the arrangement if there
+            is one. Without meaning for imported objects, which have no splits.
+        seed: Draws the objects, how they fall, and the goal. An arrangement fixes all three.
+        goal: The instruction; drawn from the protocol's templates, or the arrangement's, when None.
         objects: Names of catalogue objects to use instead of drawing them; as many as the scene
             has, or none.
         cameras: Camera preset, one of `models.cameras.CAMERA_PRESETS`.
+        arrangement: A fixed arrangement, or the name of one in `models.arrangements.library`;
+            objects, poses, targets and goal are then its own.
+        catalogue: Folder of imported objects to use instead of the built-in catalogue.
 
     Raises:
-        UnknownNameError: If scene, split or cameras do not exist.
-        ConfigError: If the seed is negative or the goal is blank.
+        UnknownNameError: If scene, split, cameras or arrangement do not exist.
+        ConfigError: If the seed is negative, the goal is blank, or objects are named besides an
+            arrangement.
     """
 
     scene: str = "cluttered15"
@@ -85,9 +94,13 @@ class SceneConfig:
     goal: str | None = None
     objects: tuple[str, ...] = ()
     cameras: str = "sr"
+    arrangement: Arrangement | str | None = None
+    catalogue: Path | None = None
 
     def __post_init__(self) -> None:
-        """Check names and values."""
+        """Check names and values; take scene and split from the arrangement."""
+        if self.arrangement is not None:
+            self._adopt(self.arrangement)
         if self.scene not in SCENE_KINDS:
             raise UnknownNameError(unknown_name_message("scene", self.scene, SCENE_KINDS))
         if self.split not in SPLITS:
@@ -98,7 +111,52 @@ class SceneConfig:
         if self.goal is not None and not self.goal.strip():
             raise ConfigError("The goal is blank; say what to grasp, or leave the goal out.")
 
+    def _adopt(self, arrangement: Arrangement | str) -> None:
+        if self.objects:
+            raise ConfigError("An arrangement brings its own objects; name one or the other.")
+        if isinstance(arrangement, str):
+            arrangement = load_arrangement(arrangement)
+        for field in ("scene", "split"):
+            object.__setattr__(self, field, getattr(arrangement, field))
+        object.__setattr__(self, "arrangement", arrangement)
+
+    @property
+    def arranged(self) -> Arrangement | None:
+        """The arrangement itself, if there is one."""
+        assert not isinstance(self.arrangement, str)
+        return self.arrangement
+
     @property
     def kind(self) -> SceneKind:
         """The scene's entry in the registry."""
         return SCENE_KINDS[self.scene]
+
+    @property
+    def title(self) -> str:
+        """What to call the scene: kind, split and seed, or the arrangement's name."""
+        if self.arranged is not None:
+            return self.arranged.name
+        return f"{self.scene} ({self.split}, seed {self.seed})"
+
+
+def scene_config(scene: str, **options: Any) -> SceneConfig:
+    """Configure a scene by the name of its kind or of an arrangement.
+
+    Args:
+        scene: One of `SCENE_KINDS` or of `arrangement_names()`.
+        options: Further attributes of `SceneConfig`.
+
+    Returns:
+        The configuration.
+
+    Raises:
+        UnknownNameError: If no scene and no arrangement has that name.
+        ConfigError: As `SceneConfig`.
+    """
+    if scene in SCENE_KINDS:
+        return SceneConfig(scene=scene, **options)
+    if scene in arrangement_names():
+        return SceneConfig(arrangement=scene, **options)
+    known = (*SCENE_KINDS, *arrangement_names())
+    message = unknown_name_message("scene", scene, known)
+    raise UnknownNameError(message.replace(", ".join(arrangement_names()), summary()))

@@ -21,6 +21,19 @@ _EMPTY_NOUN = re.compile(r"\b(objects?|things?|items?|one)$")
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlaceGoal:
+    """Where something is to be put. Ground truth: for evaluation and the oracle only.
+
+    Attributes:
+        relation: One of `perception.relations.RELATIONS`.
+        references: Names of the scene's objects that the instruction may mean as reference.
+    """
+
+    relation: str
+    references: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Goal:
     """An instruction and the objects that satisfy it.
 
@@ -28,10 +41,12 @@ class Goal:
         text: The instruction.
         targets: Names of the scene's objects that satisfy it; empty if none does. Ground truth:
             for evaluation and the oracle only.
+        place: Where to put what was picked, or None if nothing is said of it.
     """
 
     text: str
     targets: tuple[str, ...]
+    place: PlaceGoal | None = None
 
 
 def _words_of(kind: str, words: ObjectWords) -> tuple[str, ...]:
@@ -48,8 +63,10 @@ def _words_of(kind: str, words: ObjectWords) -> tuple[str, ...]:
 
 def _satisfies(kind: str, word: str, words: ObjectWords) -> bool:
     """Tell whether an object is what a template of one kind, filled with `word`, asks for."""
-    # "Give me the cup" is as well served by any other cup.
-    return word in _words_of(kind, words) or (kind == "label" and word == words.category)
+    if kind == "label":
+        # "Give me the cup" is as well served by any other cup, or by what else is called so.
+        return word in (words.label, words.category, *words.synonyms)
+    return word in _words_of(kind, words)
 
 
 def draw_goal(
@@ -97,11 +114,7 @@ def _named_targets(phrase: str, objects: dict[str, ObjectWords]) -> tuple[str, .
     if not mentioned:
         return ()
     name = mentioned[-1]
-    return tuple(
-        key
-        for key, words in objects.items()
-        if name in words.synonyms or _satisfies("label", name, words)
-    )
+    return tuple(key for key, words in objects.items() if _satisfies("label", name, words))
 
 
 def find_targets(text: str, objects: dict[str, ObjectWords]) -> tuple[str, ...]:
@@ -118,7 +131,30 @@ def find_targets(text: str, objects: dict[str, ObjectWords]) -> tuple[str, ...]:
     Returns:
         Names of the targets, in the scene's order; empty if nothing fits.
     """
-    phrase = parse_instruction(text).target_phrase
+    # Case files of others write some labels as identifiers.
+    phrase = parse_instruction(text).target_phrase.replace("_", " ")
+    return _described(phrase, objects)
+
+
+def find_goal(text: str, objects: dict[str, ObjectWords]) -> Goal:
+    """Find everything in a scene that an instruction in free wording speaks of.
+
+    Args:
+        text: The instruction.
+        objects: Words of every object in the scene, by name.
+
+    Returns:
+        The goal; `find_targets` says how objects are found.
+    """
+    instruction = parse_instruction(text)
+    place = None
+    if instruction.relation is not None and instruction.reference is not None:
+        references = _described(instruction.reference, objects)
+        place = PlaceGoal(relation=instruction.relation, references=references)
+    return Goal(text=text, targets=find_targets(text, objects), place=place)
+
+
+def _described(phrase: str, objects: dict[str, ObjectWords]) -> tuple[str, ...]:
     if not _EMPTY_NOUN.search(phrase):
         named = _named_targets(phrase, objects)
         if named:

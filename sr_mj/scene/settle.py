@@ -1,6 +1,8 @@
 """Drops objects onto the table and lets them come to rest, in simulated time."""
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import mujoco
@@ -10,15 +12,19 @@ from scipy.spatial.transform import Rotation
 from models.workspace import Workspace
 from sr_mj.errors import SceneError
 
+_logger = logging.getLogger(__name__)
+
 DROP_HEIGHT_M = 0.2
-_DROP_INTERVAL_S = 0.35
+_DROP_INTERVAL_S = 0.25
+_FENCE_INSET_M, _FENCE_INTERVAL_S = 0.015, 0.01
 _CHECK_INTERVAL_S = 0.05
-_CALM_LINEAR, _CALM_ANGULAR = 0.002, 0.05  # m/s and rad/s
-_CALM_FOR_S = 0.2
-_SETTLE_LIMIT_S = 6.0
+_CALM_LINEAR, _CALM_ANGULAR = 0.001, 0.05  # m/s and rad/s
+_CALM_FOR_S = 0.1
+_FREE_LIMIT_S, _THICK_LIMIT_S, _LAST_LIMIT_S = 1.0, 1.0, 2.0
+_HONEY = 0.7  # share of speed kept over 10 ms
 _REDROP_HEIGHT_M = 0.02
 _MAX_REDROPS = 40
-_RELEASE_SPEED = 0.01  # m/s
+_RELEASE_SPEED, _PUSH_SPEED = 0.01, 0.15  # m/s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +96,10 @@ def heap_drop(
 class Settler:
     """Drops the objects of one scene; those that wait hover where the model's `qpos0` has them.
 
+    While it simulates, a soft fence stands just inside the workspace: an object whose centre of
+    mass is outside loses its spin and is pushed back slowly. The fence is no geom, so nothing
+    can lean on it and the model stays as it is.
+
     Args:
         model: Compiled scene.
         data: Its state, robot at home; changed in place.
@@ -109,6 +119,10 @@ class Settler:
         self._bodies = tuple(bodies)
         self._workspace = workspace
         self._waiting = {body.name: model.qpos0[body.qpos].copy() for body in self._bodies}
+        self._body_ids = np.array([body.body_id for body in self._bodies], int)
+        self._dofs = np.array([np.r_[body.qvel] for body in self._bodies], int).reshape(-1, 6)
+        self._fence = np.array([workspace.lower[:2], workspace.upper[:2]])
+        self._fence += _FENCE_INSET_M * np.array([[1], [-1]])
 
     def drop(self, body: FreeBody, pose: Drop) -> None:
         """Release one object and simulate until the next one may follow.
@@ -116,6 +130,9 @@ class Settler:
         Args:
             body: The object.
             pose: Where it starts; raised as far as needed to start free of contact.
+
+        Raises:
+            SceneError: If the simulation became unstable.
         """
         self._waiting.pop(body.name, None)
         qpos = self._data.qpos[body.qpos]
@@ -128,34 +145,34 @@ class Settler:
             mujoco.mj_forward(self._model, self._data)
         # Moving, if only just: a body asleep on the table would go on sleeping in the air.
         self._data.qvel[body.dof_adr + 2] = -_RELEASE_SPEED
-        # Falling objects do not creep: the no-slip pass would double the time for nothing.
-        passes = self._model.opt.noslip_iterations
-        self._model.opt.noslip_iterations = 0
-        self._simulate(_DROP_INTERVAL_S)
-        self._model.opt.noslip_iterations = passes
+        with _creeping(self._model):
+            self._simulate(_DROP_INTERVAL_S)
 
     def wait_until_calm(self) -> float:
         """Simulate until no object moves any more.
 
+        Most of it without the no-slip pass, which triples the time and only matters to what
+        hardly moves. What still moves after a second (a ball that rolls, a trembling heap) does so
+        through honey for another; the rest of the way nothing helps.
+
         Returns:
-            Simulated seconds it took; at most the limit of 6 s, after which slow motion is
-            accepted (a ball may roll on for long).
+            Simulated seconds it took; at most the limit of 4 s, after which slow motion is
+            accepted.
 
         Raises:
             SceneError: If the simulation became unstable.
         """
-        start, calm = self._data.time, 0.0
-        dofs = np.concatenate([np.r_[body.qvel] for body in self._bodies])
-        while calm < _CALM_FOR_S and self._data.time - start < _SETTLE_LIMIT_S:
-            self._simulate(_CHECK_INTERVAL_S)
-            speed = np.abs(self._data.qvel[dofs]).reshape(-1, 2, 3).max(axis=(0, 2))
-            still = speed[0] < _CALM_LINEAR and speed[1] < _CALM_ANGULAR
-            calm = calm + _CHECK_INTERVAL_S if still else 0.0
+        start = self._data.time
+        with _creeping(self._model):
+            self._run_until_calm(_FREE_LIMIT_S)
+            self._run_until_calm(_THICK_LIMIT_S, keep=_HONEY)
+        # Without fence and honey, so that nothing rests on either.
+        self._run_until_calm(_LAST_LIMIT_S, fence=False)
         return self._data.time - start
 
     def outside(self) -> list[FreeBody]:
         """List the objects that rest outside the workspace or fell off the table."""
-        positions = np.array([self._data.xipos[body.body_id] for body in self._bodies])
+        positions = self._data.xipos[self._body_ids]
         inside = self._workspace.contains_xy(positions) & (positions[:, 2] > -0.01)
         return [body for body, ok in zip(self._bodies, inside, strict=True) if not ok]
 
@@ -178,6 +195,7 @@ class Settler:
             if not lost:
                 return
             for body in lost:
+                _logger.debug("Dropping %r again: it came to rest outside.", body.name)
                 self.drop(body, heap_drop(center, half_m / 2, rng, _REDROP_HEIGHT_M))
         names = ", ".join(body.name for body in lost)
         raise SceneError(
@@ -190,17 +208,51 @@ class Settler:
         return bool(np.any(self._model.geom_bodyid[geoms] == body.body_id))
 
     def _hold_waiting(self) -> None:
-        by_name = {body.name: body for body in self._bodies}
-        for name, qpos in self._waiting.items():
-            self._data.qpos[by_name[name].qpos] = qpos
-            self._data.qvel[by_name[name].qvel] = 0
+        for body in self._bodies:
+            if (qpos := self._waiting.get(body.name)) is not None:
+                self._data.qpos[body.qpos] = qpos
+                self._data.qvel[body.qvel] = 0
 
-    def _simulate(self, seconds: float) -> None:
-        chunk = round(_CHECK_INTERVAL_S / self._model.opt.timestep)
-        for _ in range(round(seconds / _CHECK_INTERVAL_S)):
+    def _push_back(self) -> None:
+        xy = self._data.xipos[self._body_ids, :2]
+        inward = (xy < self._fence[0]).astype(float) - (xy > self._fence[1])
+        out = np.any(inward, axis=1)
+        # Falling goes on; spin would only carry a ball further.
+        velocity = self._data.qvel[self._dofs[out]]
+        velocity[:, :2], velocity[:, 3:] = _PUSH_SPEED * inward[out], 0
+        self._data.qvel[self._dofs[out]] = velocity
+
+    def _run_until_calm(self, limit_s: float, *, keep: float = 1.0, fence: bool = True) -> None:
+        calm = 0.0
+        for _ in range(round(limit_s / _CHECK_INTERVAL_S)):
+            self._simulate(_CHECK_INTERVAL_S, keep=keep, fence=fence)
+            speed = np.abs(self._data.qvel[self._dofs])
+            still = np.all(speed[:, :3] < _CALM_LINEAR) and np.all(speed[:, 3:] < _CALM_ANGULAR)
+            calm = calm + _CHECK_INTERVAL_S if still else 0.0
+            if calm >= _CALM_FOR_S:
+                return
+
+    def _simulate(self, seconds: float, *, keep: float = 1.0, fence: bool = True) -> None:
+        """Simulate; every 10 ms the objects keep only a share of their speed."""
+        chunk = round(_FENCE_INTERVAL_S / self._model.opt.timestep)
+        for _ in range(round(seconds / _FENCE_INTERVAL_S)):
             self._hold_waiting()
+            if fence:
+                self._push_back()
+            self._data.qvel[self._dofs] *= keep
             mujoco.mj_step(self._model, self._data, chunk)
         check_stable(self._data)
+
+
+@contextmanager
+def _creeping(model: mujoco.MjModel) -> Iterator[None]:
+    """Leave the no-slip pass out; it would triple the time for nothing while objects move."""
+    passes = model.opt.noslip_iterations
+    model.opt.noslip_iterations = 0
+    try:
+        yield
+    finally:
+        model.opt.noslip_iterations = passes
 
 
 def check_stable(data: mujoco.MjData) -> None:

@@ -1,7 +1,8 @@
 import pytest
 
 from perception.errors import InvalidTextError
-from perception.language import RELATIONS, parse_instruction
+from perception.language import parse_instruction
+from perception.relations import INSIDE_RELATIONS, PHRASES, RELATIONS, canonical_relation
 
 
 @pytest.mark.parametrize(
@@ -16,13 +17,30 @@ from perception.language import RELATIONS, parse_instruction
         ("get something to eat", "something to eat"),
         ("get something to hold other things", "something to hold other things"),
         ("I want some sugar", "sugar"),
-        # Free wording falls back to the whole sentence.
-        ("Could you hand over that thing?", "could you hand over that thing"),
+        # Paraphrases.
+        ("Could you hand over that banana?", "banana"),
+        ("would you mind passing me the scissors?", "scissors"),
+        ("May I have the pear, please", "pear"),
+        ("pick the strawberry up", "strawberry"),
+        ("take the lemon out of the bowl", "lemon"),
+        ("give me the pear that is in the bowl", "pear"),
+        ("bring the mug to me", "mug"),
+        ("give me the scissors right now please", "scissors"),
+        ("where is the power drill", "power drill"),
+        ("I'd like the salt and pepper shaker", "salt and pepper shaker"),
+        ("bring me something to eat, thanks!", "something to eat"),
+        ("get something that is red", "something that is red"),
+        ("give me the can on the table", "can on the table"),  # says which, not where to
+        ("the apple, please", "apple"),
         ("pear", "pear"),
-        ("the apple, please", "the apple, please"),
+        ("place mat", "place mat"),
+        ("the chess set on the box", "chess set on the box"),
+        # Anything else falls back to the whole sentence.
+        ("I am hungry.", "i am hungry"),
+        ("put it", "put it"),
     ],
 )
-def test_pick_templates(text: str, target: str) -> None:
+def test_pick_wordings(text: str, target: str) -> None:
     instruction = parse_instruction(text)
     assert (instruction.target, instruction.relation, instruction.reference) == (target, None, None)
     assert instruction.target_phrase == target
@@ -55,6 +73,58 @@ def test_combined_templates(text: str, parts: tuple[str, str, str]) -> None:
     instruction = parse_instruction(text)
     assert (instruction.target, instruction.relation, instruction.reference) == parts
     assert instruction.target_phrase == parts[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("put the strawberry by the apple", ("strawberry", "near", "apple")),
+        ("could you hand me that banana and drop it in the bowl", ("banana", "in", "bowl")),
+        ("the mug goes next to the red box", ("mug", "next to", "red box")),
+        ("the strawberry should go in the red mug", ("strawberry", "in", "red mug")),
+        ("I want the mug to be next to the red box", ("mug", "next to", "red box")),
+        ("I'd like the soap placed on top of the box", ("soap", "on top of", "box")),
+        ("make sure the mug is near the box", ("mug", "near", "box")),
+        ("next to the box, put the mug", ("mug", "next to", "box")),
+        ("would you mind placing the mug on the box?", ("mug", "on", "box")),
+        ("Please pick up the lemon, then place it beside the mug.", ("lemon", "beside", "mug")),
+        ("Fetch me the tape. Leave it to the left of the scissors.", ("tape", "next to", "scissors")),
+        ("grab something to drink and set it down near the plate please",
+         ("something to drink", "near", "plate")),
+        ("put something to drink near the apple", ("something to drink", "near", "apple")),
+        ("get the banana into the bowl", ("banana", "in", "bowl")),
+        ("Can you please bring the cup over to the plate?", ("cup", "to", "plate")),
+        ("stack the soap onto the dish", ("soap", "on", "dish")),
+        ("set the knife alongside the plate", ("knife", "beside", "plate")),
+        ("put the salt and pepper shaker in front of the cup",
+         ("salt and pepper shaker", "next to", "cup")),
+        ("take it and put it inside the bowl", (None, "in", "bowl")),
+        ("move this over to the bowl", (None, "to", "bowl")),
+    ],
+)  # fmt: skip
+def test_composite_paraphrases(text: str, parts: tuple[str | None, str, str]) -> None:
+    instruction = parse_instruction(text)
+    assert (instruction.target, instruction.relation, instruction.reference) == parts
+
+
+@pytest.mark.parametrize("relation", RELATIONS)
+def test_region(relation: str) -> None:
+    region = parse_instruction(f"put it {relation} the bowl").region
+    assert region == ("inside" if relation in INSIDE_RELATIONS else "outside")
+    assert parse_instruction("give me the bowl").region is None
+
+
+def test_every_phrase_means_a_relation() -> None:
+    assert set(map(canonical_relation, PHRASES)) == set(RELATIONS)
+    for phrase in PHRASES:
+        parts = parse_instruction(f"put the mug {phrase} the bowl")
+        assert (parts.target, parts.reference) == ("mug", "bowl")
+        assert parts.relation == canonical_relation(phrase)
+
+
+@pytest.mark.parametrize("text", ["put the cup " * 300, "and, " * 500, "put " + "a" * 3000])
+def test_long_texts_end_soon(text: str) -> None:
+    assert parse_instruction(text).text == text.strip()
 
 
 @pytest.mark.parametrize("text", ["", "   ", "?!", "\n"])

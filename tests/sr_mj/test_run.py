@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from models.arrangements.library import summary
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
@@ -124,6 +126,35 @@ def test_records_a_video(command, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["v.mp4"]
 
 
+def test_runs_test_cases_in_turn(command, tmp_path):
+    (tmp_path / "cases").mkdir()
+    (tmp_path / "cases" / "a.txt").write_text(CASE)
+    (tmp_path / "cases" / "b.txt").write_text(
+        CASE.replace("pear", "violin").replace("\n0\n", "\n\n0\n")
+    )
+    done = command(
+        "sr_mj.run", "--cases", "cases", "--policy", "oracle", "--attempts", 1, "--out", "result"
+    )
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stdout.splitlines() if line.startswith("Scene")] == [
+        "Scene  a, 1 object",
+        "Scene  b, 1 object",
+    ]
+    assert re.fullmatch(r"Cases  2 of 2 succeeded \[.* s\]", done.stdout.splitlines()[-1])
+    for name in ("a", "b"):
+        record = json.loads((tmp_path / "result" / name / "result.json").read_text())
+        assert record["arrangement"] == name
+        assert record["objects"] == record["targets"] == ["pear"]
+
+
+def test_runs_an_arrangement(command):
+    done = command("sr_mj.run", "--scene", "grasp-seen-02", "--policy", "oracle", "--json")
+    assert done.returncode == 0, done.stderr
+    record = json.loads(done.stdout)
+    assert (record["arrangement"], record["goal"]) == ("grasp-seen-02", "give me the pear")
+    assert record["success"] and record["attempts"][-1]["grasped"] in record["targets"]
+
+
 def test_exports_a_scene(command, tmp_path):
     done = command("sr_mj.export", "--scene", "single", "--seed", 1, "--out", "scene")
     assert done.returncode == 0, done.stderr
@@ -131,12 +162,14 @@ def test_exports_a_scene(command, tmp_path):
 
 
 POLICIES = "grounding, random, sr, oracle"
+SCENES = f"cluttered15, place8, pickplace8, heavy30, single, empty, {summary()}"
+CASE = "give me the pear\n0\nassets/015.urdf 0.5 0 0.2 0 0 0\n"
 
 
 @pytest.mark.parametrize(
     ("module", "arguments", "message"),
     [
-        ("run", ["--scene", "cluttered51"], "Unknown scene 'cluttered51'. Scenes: cluttered15, place8, pickplace8, single, empty. Did you mean 'cluttered15'?"),
+        ("run", ["--scene", "cluttered51"], f"Unknown scene 'cluttered51'. Scenes: {SCENES}. Did you mean 'cluttered15'?"),
         ("run", ["--split", "unsen"], "Unknown split 'unsen'. Splits: seen, unseen. Did you mean 'unseen'?"),
         ("run", ["--policy", "grunding", "--scene", "single"], f"Unknown policy 'grunding'. Policies: {POLICIES}. Did you mean 'grounding'?"),
         ("run", ["--cameras", "srr", "--scene", "single"], "Unknown camera preset 'srr'. Presets: sr, a2. Did you mean 'sr'?"),
@@ -145,8 +178,11 @@ POLICIES = "grounding, random, sr, oracle"
         ("run", ["--goal", ""], "The goal is blank; say what to grasp, or leave the goal out."),
         ("run", ["--record", "film.avi"], "Cannot record to 'film.avi': the name ends in '.avi', expected one of .mp4, .gif."),
         ("run", ["--record", "no/film.mp4"], "Cannot record to 'no/film.mp4': create its folder first."),
+        ("run", ["--scene", "place-seen-03"], "Arrangement 'place-seen-03' asks for placing only, which is not carried out yet; choose a grasp or pick-place arrangement, or export this one."),
+        ("run", ["--cases", "mine.txt", "--goal", "give me the pear"], "Test cases bring their own goals; leave --goal or --cases out."),
+        ("run", ["--cases", "mine.txt"], "mine.txt: 0 lines; expected the goal, the targets' indices, and one line an object."),
         ("run", ["--out", "."], "Output folder '.' exists and is not empty; choose a new one."),
-        ("export", ["--scene", "plce8", "--out", "x"], "Unknown scene 'plce8'. Scenes: cluttered15, place8, pickplace8, single, empty. Did you mean 'place8'?"),
+        ("export", ["--scene", "plce8", "--out", "x"], f"Unknown scene 'plce8'. Scenes: {SCENES}. Did you mean 'place8'?"),
     ],
 )  # fmt: skip
 def test_mistakes_get_one_line_and_status_2(command, tmp_path, module, arguments, message):

@@ -87,7 +87,7 @@ def test_masses_are_those_of_the_catalogue(cluttered_scene):
 @pytest.mark.parametrize(
     ("make", "error_type", "message"),
     [
-        (lambda: SceneConfig(scene="cluttered51"), UnknownNameError, "Unknown scene 'cluttered51'. Scenes: cluttered15, place8, pickplace8, single, empty. Did you mean 'cluttered15'?"),
+        (lambda: SceneConfig(scene="cluttered51"), UnknownNameError, "Unknown scene 'cluttered51'. Scenes: cluttered15, place8, pickplace8, heavy30, single, empty. Did you mean 'cluttered15'?"),
         (lambda: SceneConfig(split="sene"), UnknownNameError, "Unknown split 'sene'. Splits: seen, unseen. Did you mean 'seen'?"),
         (lambda: SceneConfig(seed=-1), ConfigError, "Seed is -1; expected an integer of 0 or more."),
         (lambda: SceneConfig(goal=" "), ConfigError, "The goal is blank; say what to grasp, or leave the goal out."),

@@ -238,8 +238,30 @@ SEEN_CARE: tuple[Entry, ...] = (
             seed=19,
         ),
         words=ObjectWords(
-            label="darlie box", synonyms=("darlie toothpaste box", "yellow box"), colors=("yellow",)
+            label="darlie box",
+            synonyms=("darlie toothpaste box", "yellow box", "box"),
+            colors=("yellow",),
         ),
         matter=Matter(density_kg_m3=650.0, source="a tube of paste in a carton; assumed"),
+    ),
+    Entry(
+        name="soap_box",
+        shape=partial(
+            packages.carton,
+            size_m=(0.094, 0.034, 0.060),
+            title="SOAP",
+            subtitle="olive",
+            ground=(238, 240, 226),
+            ink=(58, 96, 50),
+            accent=(150, 190, 120),
+            picture="disc",
+            seed=100,
+        ),
+        words=ObjectWords(
+            label="box",
+            synonyms=("soap box", "soap carton", "white box"),
+            colors=("white",),
+        ),
+        matter=Matter(density_kg_m3=600.0, source="a bar of soap in a carton; assumed"),
     ),
 )

@@ -9,6 +9,7 @@ from models.objects import collision
 from models.objects.asset import Shape
 from models.objects.atlas import Solid
 from models.objects.collision import CollisionPart
+from models.objects.families.ornaments import Ornament, ornament
 from models.objects.paint import Color, as_image, grid, lay, noise, plain, shade
 from models.objects.surface import Surface, circle, ellipsoid, revolve, sweep
 
@@ -29,6 +30,8 @@ class Animal:
         neck_radius: Radius of the neck.
         head: Half axes of the head.
         snout: Length of the muzzle.
+        muzzle: Half width of the muzzle in half widths of the head.
+        nose: Width of the nose in the same measure.
         ear: Radius of the ears.
         tail: Length of the tail.
     """
@@ -41,6 +44,8 @@ class Animal:
     neck_radius: float = 0.13
     head: tuple[float, float, float] = (0.17, 0.13, 0.14)
     snout: float = 0.13
+    muzzle: float = 0.62
+    nose: float = 0.3
     ear: float = 0.06
     tail: float = 0.42
 
@@ -50,10 +55,13 @@ def quadruped(
     animal: Animal,
     coat: Color,
     marks: Color,
-    pattern: Literal["plain", "spots", "stripes"] = "plain",
+    pattern: Literal["plain", "spots", "stripes", "patches"] = "plain",
     crest: Literal["none", "mane", "ridge"] = "none",
     crest_color: Color = (120, 70, 30),
     trunk: bool = False,
+    extra: Ornament = "none",
+    extra_color: Color = (226, 214, 186),
+    nose_color: Color = _EYE,
     seed: int,
 ) -> Shape:
     """Shape a standing animal that looks towards +x.
@@ -66,6 +74,9 @@ def quadruped(
         crest: A lion's mane, a zebra's ridge, or nothing.
         crest_color: Colour of the crest.
         trunk: Give it an elephant's trunk, tusks and large ears.
+        extra: Humps, horns, antlers or plates.
+        extra_color: Their colour.
+        nose_color: Colour of the nose.
         seed: Varies the marks.
     """
     rng = np.random.default_rng(seed)
@@ -82,7 +93,7 @@ def quadruped(
     neck_path = np.linspace(_beside(shoulder, -0.06 * unit, 0, -0.03 * unit), head, 6)
     solids += [*legs, _neck(neck_path, radius, fur)]
     parts += [*leg_parts, collision.capsule(0.95 * radius, neck_path[0], head)]
-    solids += _head(animal, head, fur, coat, trunk)
+    solids += _head(animal, head, fur, coat, None if trunk else nose_color)
     head_half = np.array(animal.head) * unit
     parts.append(collision.ellipsoid(head_half, head))
     if not trunk:
@@ -98,7 +109,16 @@ def quadruped(
         parts.append(_mane_part(head, head_half))
     if crest == "ridge":
         solids.append(_ridge(neck_path, radius, crest_color))
-    return Shape(solids=solids, collision=parts, gloss=0.2)
+    more, more_parts = ornament(
+        extra,
+        unit=unit,
+        back=_beside(np.zeros(3), 0, 0, height + 0.92 * trunk_half[2]),
+        head=head,
+        head_half=head_half,
+        fur=fur,
+        color=extra_color,
+    )
+    return Shape(solids=[*solids, *more], collision=[*parts, *more_parts], gloss=0.2)
 
 
 def _coat(rng: np.random.Generator, coat: Color, marks: Color, pattern: str) -> np.ndarray:
@@ -110,6 +130,8 @@ def _coat(rng: np.random.Generator, coat: Color, marks: Color, pattern: str) -> 
         cells = 0.5 * (1 - np.cos(2 * np.pi * (7 * u + 0.5 * wander))) * 0.5
         cells = cells * (1 - np.cos(2 * np.pi * (6 * v + 0.6 * wander)))
         image = lay(image, marks, np.clip((cells - 0.30) * 8, 0, 1))
+    if pattern == "patches":
+        image = lay(image, marks, np.clip((wander - 0.12) * 14, 0, 1))
     if pattern == "stripes":
         wave = np.sin(2 * np.pi * (7 * u + 0.35 * wander))
         image = lay(image, marks, np.clip(wave * 5, 0, 1))
@@ -166,37 +188,41 @@ def _legs(
 
 
 def _head(
-    animal: Animal, head: np.ndarray, fur: np.ndarray, coat: Color, trunk: bool
+    animal: Animal, head: np.ndarray, fur: np.ndarray, coat: Color, nose_color: Color | None
 ) -> list[Solid]:
-    """Build skull, muzzle, ears and eyes."""
+    """Build skull and eyes; where the nose has a colour, also muzzle and ears."""
     unit = animal.body_m
     half = np.array(animal.head) * unit
     solids = [Solid.of(ellipsoid(half, num_rings=13, num_columns=20).moved(head), plain(coat))]
-    if not trunk:
-        reach = animal.snout * unit
-        muzzle = ellipsoid((reach, 0.62 * half[1], 0.58 * half[2]), num_rings=11, num_columns=16)
-        lighter = shade(coat, 1.12, 18)
-        place = _beside(head, 0.85 * half[0], 0, -0.25 * half[2])
-        solids.append(Solid.of(muzzle.moved(place), plain(lighter)))
-        nose = ellipsoid((0.3 * reach, 0.3 * half[1], 0.22 * half[2]), num_rings=9, num_columns=12)
-        solids.append(
-            Solid.of(nose.moved(_beside(place, 0.85 * reach, 0, 0.2 * half[2])), plain(_EYE))
-        )
+    if nose_color is not None:
+        solids += _muzzle(animal, head, half, coat, nose_color)
     for side in (-1, 1):
         eye = ellipsoid([0.14 * half[2] + 0.0006] * 3, num_rings=7, num_columns=10)
-        solids.append(
-            Solid.of(
-                eye.moved(_beside(head, 0.55 * half[0], side * 0.75 * half[1], 0.35 * half[2])),
-                plain(_EYE),
-            )
-        )
-        if not trunk:
-            ear = ellipsoid(
-                np.array([0.5, 0.8, 1.2]) * animal.ear * unit, num_rings=9, num_columns=12
-            )
+        place = _beside(head, 0.55 * half[0], side * 0.75 * half[1], 0.35 * half[2])
+        solids.append(Solid.of(eye.moved(place), plain(_EYE)))
+        if nose_color is not None:
+            size = np.array([0.5, 0.8, 1.2]) * animal.ear * unit
+            ear = ellipsoid(size, num_rings=9, num_columns=12)
             spot = _beside(head, -0.35 * half[0], side * 0.75 * half[1], 0.95 * half[2])
             solids.append(Solid.of(ear.moved(spot), fur))
     return solids
+
+
+def _muzzle(
+    animal: Animal, head: np.ndarray, half: np.ndarray, coat: Color, nose_color: Color
+) -> list[Solid]:
+    """Build a muzzle and the nose at its end."""
+    reach, wide, nose = animal.snout * animal.body_m, animal.muzzle, animal.nose
+    size = (reach, wide * half[1], 0.94 * wide * half[2])
+    muzzle = ellipsoid(size, num_rings=11, num_columns=16)
+    place = _beside(head, 0.85 * half[0], 0, -0.25 * half[2])
+    tip_size = (0.3 * reach, nose * half[1], 0.73 * nose * half[2])
+    tip = ellipsoid(tip_size, num_rings=9, num_columns=12)
+    tip_at = _beside(place, 0.85 * reach, 0, 0.2 * half[2])
+    return [
+        Solid.of(muzzle.moved(place), plain(shade(coat, 1.12, 18))),
+        Solid.of(tip.moved(tip_at), plain(nose_color)),
+    ]
 
 
 def _elephant_parts(

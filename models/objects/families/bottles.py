@@ -14,7 +14,7 @@ from models.objects.paint import Color, Poster, plain
 from models.objects.surface import circle, revolve, skin, sweep
 
 CapKind = Literal["screw", "flip", "pump", "trigger"]
-_NUM_COLUMNS = 40
+_NUM_COLUMNS = 48
 _LABEL_PX = (224, 440)
 
 
@@ -162,8 +162,8 @@ def _body_parts(
     elif squareness == 2.0 and np.isclose(width, depth):
         low = collision.cylinder(width / 2, 0.0, height * shoulder)
     else:
-        low = collision.prism(outline[:: len(outline) // 10][:16], 0.0, height * shoulder)
-    rim = outline[:: len(outline) // 10]
+        low = collision.prism(outline[:: len(outline) // 12][:16], 0.0, height * shoulder)
+    rim = outline[:: len(outline) // 12]
     rings = [
         np.column_stack([rim, np.full(len(rim), height * shoulder)]),
         np.column_stack([rim * 0.9, np.full(len(rim), level)]),

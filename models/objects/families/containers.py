@@ -1,6 +1,7 @@
 """Hollow containers: bowls, mugs, cups, tubs. Their insides are open to other objects."""
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 from models.objects import collision
@@ -172,3 +173,49 @@ def cup(
         rolls=squareness == 2.0,
         gloss=0.45,
     )
+
+
+def vase(
+    *,
+    belly_m: float,
+    mouth_m: float,
+    foot_m: float,
+    height_m: float,
+    wall_m: float,
+    glaze: Color,
+    foot: Color,
+    seed: int,
+) -> Shape:
+    """Shape a round-bellied vase with a flared mouth.
+
+    Args:
+        belly_m: Widest diameter, at 40 % of the height.
+        mouth_m: Diameter of the mouth.
+        foot_m: Diameter of the foot.
+        height_m: Height.
+        wall_m: Thickness of the wall.
+        glaze: Colour of the glaze, outside and inside.
+        foot: Colour of the bare clay at the foot.
+        seed: Varies the glaze.
+    """
+    rng = np.random.default_rng(seed)
+    knots = np.array([(0, foot_m), (0.40, belly_m), (0.86, 0.92 * mouth_m), (1.0, mouth_m)])
+    level = np.linspace(0, 1, 14)
+    radius = PchipInterpolator(knots[:, 0], knots[:, 1] / 2)(level)
+    floor = 1.5 * wall_m
+    outer = np.stack([radius, height_m * level], axis=1)
+    inner = np.stack([radius - wall_m, floor + (height_m - floor) * level], axis=1)
+    lip = [(mouth_m / 2 - wall_m / 2, height_m + 0.25 * wall_m)]
+    profile = np.concatenate([[(0.0, 0.0)], outer, lip, inner[::-1], [(0.0, floor)]])
+    profile[:, 1] *= height_m / profile[:, 1].max()
+    image = _glazed(rng, glaze, glaze, _rim_v(profile), glaze)
+    u, v = grid(_GLAZE_PX)
+    drip = 0.20 + 0.03 * np.sin(2 * np.pi * 5 * u) + 0.02 * np.sin(2 * np.pi * 11 * u)
+    image = lay(image, foot, (v < drip * _rim_v(profile)).astype(float))
+    bands = np.abs(v / _rim_v(profile) - 0.62) < 0.018
+    image = lay(image, foot, bands.astype(float))
+    steps = [0, 5, 13]
+    parts = collision.vessel(outer[steps], inner[steps], num_sectors=8)
+    surface = revolve(profile, num_columns=48)
+    solids = [Solid.of(surface, as_image(image))]
+    return Shape(solids=solids, collision=parts, rolls=True, gloss=0.6)

@@ -282,4 +282,6 @@ def banana(*, diameter_m: float, length_m: float, peel: Color, shade: Color, see
     nodes = np.array([2, 6, 12, 18, 24, 28])
     middle = [thickness[a:b].mean() * 0.97 for a, b in itertools.pairwise(nodes)]
     parts = collision.capsule_chain(np.array(middle), path[nodes])
-    return Shape(solids=[Solid.of(surface, as_image(image))], collision=parts, gloss=0.2)
+    return Shape(
+        solids=[Solid.of(surface, as_image(image))], collision=parts, rolls=True, gloss=0.2
+    )

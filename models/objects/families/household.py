@@ -50,7 +50,7 @@ def soap_dish(
     """Shape a shallow oval dish with drain grooves in its floor."""
     rng = np.random.default_rng(seed)
     half, height = size_m[0] / 2, size_m[2]
-    outline = circle(48, 3.0, size_m[1] / size_m[0])
+    outline = circle(80, 3.0, size_m[1] / size_m[0])
     floor = 1.3 * wall_m
     outer = np.array([(0.80 * half, 0.0), (0.93 * half, 0.45 * height), (half, height)])
     inner = np.array(
@@ -82,10 +82,10 @@ def computer_mouse(*, length_m: float, color: Color, wheel: Color) -> Shape:
     """Shape a computer mouse: arched shell, two buttons, wheel."""
     half = length_m / 2
     width, height = 0.29 * length_m, 0.36 * length_m
-    outline = circle(48, 2.6, width / half)
+    outline = circle(72, 2.6, width / half)
     share = np.array([0.0, 0.94, 1.0, 0.995, 0.95, 0.85, 0.70, 0.50, 0.27, 0.0])
     level = np.array([0.0, 0.0, 0.04, 0.22, 0.42, 0.62, 0.79, 0.91, 0.98, 1.0])
-    rings = np.empty((len(share), 48, 3))
+    rings = np.empty((len(share), 72, 3))
     rings[..., :2] = half * share[:, None, None] * outline
     # Higher behind the middle than at the buttons, which point towards +x.
     slope = 1 - 0.22 * (rings[..., 0] / half + 0.25) ** 2 - 0.10 * rings[..., 0] / half
@@ -99,7 +99,7 @@ def computer_mouse(*, length_m: float, color: Color, wheel: Color) -> Shape:
     spin = sweep(np.array([(0, -0.0035, 0), (0, 0.0035, 0)]), 0.011, num_columns=24, up=(0, 0, 1))
     middle = (0.30 * length_m, 0.0, 0.70 * height - 0.004)
     solids = [Solid.of(shell, poster.image()), Solid.of(spin.moved(middle), plain(wheel))]
-    few = np.arange(0, 48, 6)
+    few = np.arange(0, 72, 9)
     hull = rings[np.array([1, 3, 5, 7])][:, few].reshape(-1, 3)
     return Shape(solids=solids, collision=[collision.convex(hull)], gloss=0.4)
 
@@ -154,7 +154,7 @@ def tape_roll(
     closed = np.concatenate([profile, profile[:1]])
     steps = np.linalg.norm(np.diff(closed, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
-    surface = revolve(profile, num_columns=56, loop=True)
+    surface = revolve(profile, num_columns=72, loop=True)
     u, v = grid((256, 128))
     image = np.asarray(tape, float) + 10 * noise(rng, u.shape, (64, 2), 2)[..., None]
     layers = ((v > along[1]) & (v < along[2])) | ((v > along[5]) & (v < along[6]))
@@ -163,7 +163,9 @@ def tape_roll(
     card_area = (v < along[1]) | (v > along[6])
     image = lay(image, core, card_area.astype(float))
     parts = _ring_of_boxes(outside, hole, width_m)
-    return Shape(solids=[Solid.of(surface, as_image(image))], collision=parts, gloss=0.4)
+    return Shape(
+        solids=[Solid.of(surface, as_image(image))], collision=parts, rolls=True, gloss=0.4
+    )
 
 
 def _ring_of_boxes(
@@ -187,7 +189,7 @@ def marker(*, diameter_m: float, length_m: float, color: Color, words: str) -> S
     heights = np.array([0, 0.0, 0.02, 0.10, 0.101, 0.30, 0.50, 0.62, 0.621, 0.64, 0.95, 1.0, 1.0])
     shares = np.array([0, 0.7, 0.86, 0.86, 0.92, 0.92, 0.92, 0.92, 1.0, 1.0, 1.0, 0.82, 0])
     profile = np.stack([shares * radius, heights * length_m], axis=1)
-    surface = revolve(profile, num_columns=28, v=heights)
+    surface = revolve(profile, num_columns=44, v=heights)
     poster = Poster(WHITE, (320, 96)).rectangle((0, 0, 1, 0.38), color)
     poster.rectangle((0, 0.90, 1, 1), color).rectangle((0, 0.80, 1, 0.82), color)
     for left in (0.0, 0.5):

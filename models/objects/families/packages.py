@@ -25,9 +25,25 @@ def can(
     bottom: Color,
     ink: Color,
     accent: Color,
+    squareness: float = 2.0,
+    aspect: float = 1.0,
     seed: int,
 ) -> Shape:
-    """Shape a food can: two-coloured label twice around, rims, ridged metal lids."""
+    """Shape a food can: two-coloured label twice around, rims, ridged metal lids.
+
+    Args:
+        diameter_m: Extent along x.
+        height_m: Height.
+        title: Words on the label.
+        subtitle: Line below.
+        top: Colour of the label's upper half.
+        bottom: Colour of its lower half.
+        ink: Colour of the title.
+        accent: Colour of the emblem.
+        squareness: Exponent of the superelliptic section, 2 for round.
+        aspect: Extent along y over extent along x.
+        seed: Varies lids and bar code.
+    """
     rng = np.random.default_rng(seed)
     r, h = diameter_m / 2, height_m
     rim = 0.0025
@@ -36,8 +52,9 @@ def can(
         + [(r - 0.001, z) for z in np.linspace(rim + 0.004, h - rim - 0.004, 5)]
         + [(r - 0.001, h - rim - 0.001), (r, h - rim), (r, h - 0.001), (r - 0.002, h)]
     )
-    wall = revolve(side, num_columns=48, v=side[:, 1] / h)
-    ring = circle(48) * (r - 0.002)
+    outline = circle(48, squareness, aspect)
+    wall = revolve(side, section=outline, v=side[:, 1] / h)
+    ring = outline * (r - 0.002)
     lids = [
         Panel(
             surface=disc(np.column_stack([ring, np.full(48, z)]), faces_up=z > 0),
@@ -47,7 +64,14 @@ def can(
     ]
     label = _can_label(title, subtitle, top, bottom, ink, accent, rng)
     body = Solid(panels=(Panel(surface=wall, image=label), *lids))
-    return Shape(solids=[body], collision=[collision.cylinder(r, 0.0, h)], rolls=True, gloss=0.5)
+    if squareness == 2.0:
+        part = collision.cylinder(r, 0.0, h)
+    else:
+        # Flat sides, so that it does not rock; the corners are cut.
+        corners = [(1, 0.6), (0.8, 1), (-0.8, 1), (-1, 0.6), (-1, -0.6), (-0.8, -1)]
+        octagon = np.array([*corners, (0.8, -1), (1, -0.6)]) * [r, aspect * r]
+        part = collision.prism(octagon, 0.0, h)
+    return Shape(solids=[body], collision=[part], rolls=squareness == 2.0, gloss=0.5)
 
 
 def _lid(rng: np.random.Generator) -> np.ndarray:

@@ -7,7 +7,10 @@ from models.objects import collision
 from models.objects.asset import Shape
 from models.objects.atlas import Panel, Solid
 from models.objects.paint import BLACK, WHITE, Color, Poster, brushed_metal, plain, shade, wood
-from models.objects.surface import circle, plate, revolve, rounded_box, sweep
+from models.objects.surface import circle, plate, refined, revolve, rounded_box, sweep
+
+# Spacing of points along the outlines of blades.
+_STEP_M = 0.0038
 
 
 def scissors(*, length_m: float, width_m: float, handle: Color, seed: int) -> Shape:
@@ -35,7 +38,7 @@ def scissors(*, length_m: float, width_m: float, handle: Color, seed: int) -> Sh
         outline = blade if sign > 0 else blade[::-1]
         turn = Rotation.from_euler("z", sign * opening)
         shift = (pivot_x, 0, 0)
-        surface = plate(_dense(outline), thickness, bevel_m=0.0008, base_m=low)
+        surface = plate(refined(outline, _STEP_M), thickness, bevel_m=0.0008, base_m=low)
         solids.append(Solid.of(surface.moved(shift, turn), metal))
         board = collision.prism(outline[[0, 1, 2, 4]], low, low + thickness)
         parts.append(board.moved(shift, turn))
@@ -58,15 +61,6 @@ def scissors(*, length_m: float, width_m: float, handle: Color, seed: int) -> Sh
     return Shape(solids=solids, collision=parts, gloss=0.6)
 
 
-def _dense(outline: np.ndarray, step_m: float = 0.006) -> np.ndarray:
-    """Insert points into the edges of a polygon, so that its fan has no slivers."""
-    points = []
-    for start, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-        num = max(1, int(np.linalg.norm(end - start) / step_m))
-        points += [start + (end - start) * k / num for k in range(num)]
-    return np.array(points)
-
-
 def knife(*, length_m: float, handle: Color, rivet: Color, seed: int) -> Shape:
     """Shape a kitchen knife lying on its side: steel blade, riveted handle."""
     metal = brushed_metal(np.random.default_rng(seed), (196, 200, 206))
@@ -77,7 +71,9 @@ def knife(*, length_m: float, handle: Color, rivet: Color, seed: int) -> Shape:
     back = np.stack([blade_length * t[::-1], height / 2 - 0.45 * height * t[::-1] ** 4], axis=1)
     outline = np.concatenate([belly, back[1:]])
     thickness = 0.0022
-    blade = plate(_dense(outline), thickness, bevel_m=0.0008, base_m=0.0072 - thickness / 2)
+    blade = plate(
+        refined(outline, _STEP_M), thickness, bevel_m=0.0008, base_m=0.0072 - thickness / 2
+    )
     along = np.linspace(-grip, 0.004, 9)
     swell = 1 + 0.10 * np.cos(np.linspace(0, 4 * np.pi, 9))
     path = np.stack([along, 0 * along + 0.12 * height, 0 * along + 0.0072], axis=1)
@@ -96,9 +92,24 @@ def knife(*, length_m: float, handle: Color, rivet: Color, seed: int) -> Shape:
 
 
 def screwdriver(
-    *, length_m: float, handle_m: float, grip: Color, accent: Color, seed: int
+    *,
+    length_m: float,
+    handle_m: float,
+    grip: Color,
+    accent: Color,
+    cross: bool = False,
+    seed: int,
 ) -> Shape:
-    """Shape a flat screwdriver lying on its side; `handle_m` is the handle's diameter."""
+    """Shape a screwdriver lying on its side.
+
+    Args:
+        length_m: Length.
+        handle_m: Diameter of the handle.
+        grip: Colour of the handle.
+        accent: Colour of its stripes.
+        cross: Give it a Phillips tip instead of a flat one.
+        seed: Varies the grinding marks.
+    """
     metal = brushed_metal(np.random.default_rng(seed), (188, 190, 196))
     radius, split = handle_m / 2, 0.46 * length_m
     level = np.array([0, 0.0, 0.03, 0.10, 0.35, 0.60, 0.74, 0.82, 0.90, 1.0, 1.0])
@@ -129,7 +140,14 @@ def screwdriver(
             [1.3 * shaft_radius, 0.0006],
         ]
     )
-    tip = sweep(tip_path, flat, section=circle(16, 4.0), up=(0, 1, 0))
+    if cross:
+        star = (
+            circle(48) * (1 - 0.28 * np.abs(np.sin(2 * np.arange(48) * (2 * np.pi / 48))))[:, None]
+        )
+        cone = shaft_radius * np.array([[1.0, 1.0], [1.0, 1.0], [0.25, 0.25]])
+        tip = sweep(tip_path, cone, section=star, up=(0, 1, 0))
+    else:
+        tip = sweep(tip_path, flat, section=circle(16, 4.0), up=(0, 1, 0))
     lying = Rotation.from_euler("y", 90, degrees=True)
     images = [(handle, stripes.image()), (shaft, metal), (tip, metal)]
     parts = [
@@ -307,7 +325,7 @@ def mallet(
     path = np.stack([0 * y + head_x, y, 0 * y + radius], axis=1)
     head_image = Poster(faces[0], (128, 32)).rectangle((0, 0, 1, 0.40), faces[1])
     head_image.rectangle((0, 0.40, 1, 0.60), (44, 44, 48))
-    head = sweep(path, np.stack([radius * share] * 2, 1), num_columns=32)
+    head = sweep(path, np.stack([radius * share] * 2, 1), num_columns=40)
     # The handle runs straight, so its end hangs above the table; the mallet tips onto it.
     tilt = Rotation.from_euler("y", -np.arcsin((radius - handle_radius) / head_x))
     x = np.linspace(0, length_m - 0.3 * radius, 9)

@@ -78,9 +78,9 @@ def block(*, size_m: tuple[float, float, float], color: Color, letter: str, seed
 def block_cylinder(*, diameter_m: float, height_m: float, color: Color, seed: int) -> Shape:
     """Shape a wooden column standing upright."""
     radius, edge = diameter_m / 2, 0.002
-    wall = [(radius, z) for z in np.linspace(edge, height_m - edge, 5)]
+    wall = [(radius, z) for z in np.linspace(edge, height_m - edge, 7)]
     profile = [(0, 0), (radius - edge, 0), *wall, (radius - edge, height_m), (0, height_m)]
-    surface = revolve(profile)
+    surface = revolve(profile, num_columns=64)
     parts = [collision.cylinder(radius, 0.0, height_m)]
     solid = Solid.of(surface, _painted_wood(color, seed, (128, 128)))
     return Shape(solids=[solid], collision=parts, rolls=True, gloss=0.2)
@@ -90,7 +90,7 @@ def block_arch(*, size_m: tuple[float, float, float], color: Color, seed: int) -
     """Shape a wooden bridge block: a half-round opening below, along y."""
     width, depth, height = size_m
     hole = 0.62 * height
-    share = np.linspace(0, 1, 33)
+    share = np.linspace(0, 1, 65)
     angle = np.pi * (1 - share)
     inner = hole * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     turns = [0.0, 0.25, 0.75, 1.0]
@@ -109,8 +109,8 @@ def block_arch(*, size_m: tuple[float, float, float], color: Color, seed: int) -
     ends = [np.broadcast_to(ring.mean(axis=0), (1, *ring.shape)) for ring in (stack[0], stack[-1])]
     surface = skin(np.concatenate([ends[0], stack, ends[1]]))
     parts = []
-    for low in (0, 8, 16, 24):
-        span = [low, low + 4, low + 8]
+    for low in (0, 16, 32, 48):
+        span = [low, low + 8, low + 16]
         parts.append(collision.convex(stack[span].reshape(-1, 3)))
     solid = Solid.of(surface, _painted_wood(color, seed, (96, 128)))
     return Shape(solids=[solid], collision=parts, gloss=0.2)

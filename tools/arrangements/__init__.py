@@ -1,0 +1,1 @@
+"""Makes the fixed arrangements of `models/arrangements/data`."""
