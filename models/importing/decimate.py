@@ -68,10 +68,11 @@ def simplify(mesh: trimesh.Trimesh, num_faces: int = MAX_FACES) -> trimesh.Trime
         raise MissingPackageError(
             "fast-simplification is not installed, it decimates meshes; pip install 'sr-mj[import]'"
         ) from None
-    vertices, faces = fast_simplification.simplify(
-        np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32),
+    vertices, faces, *_ = fast_simplification.simplify(
+        np.asarray(mesh.vertices, np.float64),
+        np.asarray(mesh.faces, np.int32),
         target_count=num_faces,
-    )  # fmt: skip
+    )
     light = trimesh.Trimesh(np.asarray(vertices, float), faces, process=False)
     light.update_faces(light.nondegenerate_faces())
     light.remove_unreferenced_vertices()

@@ -23,6 +23,7 @@ from models.importing.store import write_atomically
 from models.objects.cache import cache_dir
 from models.objects.collision import MAX_VERTICES, CollisionPart, convex
 
+PACKAGE = "coacd"
 # A body that fills this much of its hull is its hull.
 _CONVEX_FILL = 0.97
 # Splinters of less than this fraction of the object's hull carry no contact.
@@ -58,7 +59,7 @@ def require_coacd() -> None:
     Raises:
         MissingPackageError: If it is not.
     """
-    if importlib.util.find_spec("coacd") is None:
+    if importlib.util.find_spec(PACKAGE) is None:
         raise MissingPackageError(
             "coacd is not installed, it cuts meshes into convex parts; pip install 'sr-mj[import]'"
         )

@@ -60,7 +60,7 @@ def label_from_stem(stem: str) -> Label:
     Returns:
         The label.
     """
-    noun = re.sub(r"^(\d+_([a-z]_)?)+(?=[a-z])", "", tidy_name(stem)).replace("_", " ")
+    noun = re.sub(r"^(\d+_([a-z]_)?)+(?=[a-z])", "", name_from_key(stem)).replace("_", " ")
     return Label(name=name_from_key(stem), words=ObjectWords(label=noun))
 
 

@@ -9,8 +9,8 @@ from models.importing.mesh_file import MESH_SUFFIXES
 
 # Where the well-known collections keep the mesh of an object, the best first.
 _KNOWN_MESHES = (
-    "google_64k/textured.obj",  # YCB; decimated here anyway
-    "google_16k/textured.obj",
+    "google_16k/textured.obj",  # YCB; the finer ones would be decimated here
+    "google_64k/textured.obj",
     "google_512k/textured.obj",
     "tsdf/textured.obj",
     "poisson/textured.obj",

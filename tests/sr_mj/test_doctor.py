@@ -61,7 +61,7 @@ def test_the_packages_are_those_of_the_project_file():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     wanted = {
         match.group()
-        for text in project["dependencies"]
+        for text in (*project["dependencies"], *project["optional-dependencies"]["sim"])
         if (match := re.match(r"[A-Za-z0-9-]+", text))
     }
     assert set(doctor._PACKAGES) == wanted
