@@ -5,7 +5,7 @@ import sys
 import pytest
 
 BLOCKED = {
-    "perception": ("mujoco", "dm_control", "mink", "policy", "sr_mj", "models"),
+    "perception": ("mujoco", "dm_control", "mink", "trimesh", "lxml", "imageio", "policy", "sr_mj", "models"),
     "policy": ("mujoco", "dm_control", "mink", "open3d", "open_clip", "perception", "sr_mj", "models"),
     "models": ("open3d", "open_clip", "torch", "mink", "perception", "policy", "sr_mj"),
 }  # fmt: skip
@@ -37,7 +37,10 @@ def test_siblings_import_without_each_other(package):
     assert int(done.stdout) >= 5
 
 
-@pytest.mark.parametrize("module", ["sr_mj.run", "sr_mj.export", "sr_mj.doctor"])
+@pytest.mark.parametrize(
+    "module",
+    ["sr_mj.run", "sr_mj.export", "sr_mj.doctor", "perception.lift", "models.import_objects"],
+)
 def test_help_loads_nothing_heavy(module):
     code = (
         "import sys, runpy; sys.argv = ['x', '--help']\n"
