@@ -27,8 +27,10 @@ if TYPE_CHECKING:
     from perception.readers.folder import save_views
     from perception.readers.frames import ReadOptions
     from perception.scene import Answer, LiftedScene
+    from perception.segments import SegmentConfig, find_segments
     from perception.text_scores import TextScorer
     from perception.views import CameraView, Intrinsics
+    from perception.voxels import reduce_cloud
 
 _MODULE_OF = {
     "Answer": "scene",
@@ -46,10 +48,12 @@ _MODULE_OF = {
     "Percept": "lifter",
     "PerceptionError": "errors",
     "ReadOptions": "readers.frames",
+    "SegmentConfig": "segments",
     "TextFeatures": "encoders.base",
     "TextScorer": "text_scores",
     "available_encoders": "encoders",
     "encoder_weights_status": "encoders",
+    "find_segments": "segments",
     "fit_config": "fitting",
     "fuse": "fusion",
     "lift_features": "lifting",
@@ -57,6 +61,7 @@ _MODULE_OF = {
     "parse_instruction": "language",
     "read_pair": "readers",
     "read_views": "readers",
+    "reduce_cloud": "voxels",
     "save_views": "readers.folder",
 }
 
@@ -76,10 +81,12 @@ __all__ = [
     "Percept",
     "PerceptionError",
     "ReadOptions",
+    "SegmentConfig",
     "TextFeatures",
     "TextScorer",
     "available_encoders",
     "encoder_weights_status",
+    "find_segments",
     "fit_config",
     "fuse",
     "lift_features",
@@ -87,6 +94,7 @@ __all__ = [
     "parse_instruction",
     "read_pair",
     "read_views",
+    "reduce_cloud",
     "save_views",
 ]
 

@@ -14,7 +14,12 @@ from perception.fusion import FusionConfig, fuse, ordered_views
 from perception.language import parse_instruction
 from perception.lifting import LiftingConfig, lift_features
 from perception.scene import LiftedScene
-from perception.text_scores import DEFAULT_NEGATIVE_PROMPTS, DEFAULT_SHARPNESS, TextScorer
+from perception.text_scores import (
+    DEFAULT_NEGATIVE_PROMPTS,
+    DEFAULT_SHARPNESS,
+    PLAIN_PROMPT,
+    TextScorer,
+)
 from perception.views import CameraView
 from perception.voxels import voxel_means
 
@@ -34,6 +39,7 @@ class LifterConfig:
         negative_prompts: Texts that fit anything; see `perception.similarity.relevancy`. Empty
             makes the similarity a plain cosine.
         sharpness: Steepness of the relevancy.
+        prompts: Wordings that each phrase is put into; see `perception.text_scores.TextScorer`.
         num_cached_images: Images whose feature maps are remembered.
     """
 
@@ -45,6 +51,7 @@ class LifterConfig:
     is_table_lifted: bool = False
     negative_prompts: tuple[str, ...] = DEFAULT_NEGATIVE_PROMPTS
     sharpness: float = DEFAULT_SHARPNESS
+    prompts: tuple[str, ...] = PLAIN_PROMPT
     num_cached_images: int = 12
 
     def __post_init__(self) -> None:
@@ -101,6 +108,7 @@ class MultiViewLifter:
             encoder,
             negative_prompts=self.config.negative_prompts,
             sharpness=self.config.sharpness,
+            prompts=self.config.prompts,
         )
         self._scenes: LruCache[tuple[GeometryCloud, FeatureCloud]] = LruCache(1)
 
@@ -201,14 +209,22 @@ class MultiViewLifter:
         normals = np.where(norms > 0.1, normals / np.maximum(norms, 0.1), [0.0, 0.0, 1.0])
         return points, colors, normals.astype(np.float32)
 
-    def _feature_maps(self, views: Sequence[CameraView]) -> list[Tensor]:
+    def _feature_maps(self, views: Sequence[CameraView]) -> Sequence[Tensor] | Tensor:
         """Return one (C, h, w) map a view, encoding only the images that are not remembered."""
         keys = [f"{self.encoder.fingerprint}|{hash_image(view.rgb)}" for view in views]
         maps = {key: m for key in keys if (m := self._maps.get(key)) is not None}
         missing = {k: v.rgb for k, v in zip(keys, views, strict=True) if k not in maps}
         for shape in sorted({rgb.shape for rgb in missing.values()}):
             group = {key: rgb for key, rgb in missing.items() if rgb.shape == shape}
-            maps.update(zip(group, self.encoder.encode_dense(list(group.values())), strict=True))
+            encoded = self.encoder.encode_dense(list(group.values()))
+            encoded = encoded.to(self.config.lifting.dtype)
+            maps.update(zip(group, encoded, strict=True))
+            if list(group) == keys:
+                self._remember(maps)
+                return encoded  # in one piece: lifting then copies nothing
+        self._remember(maps)
+        return [maps[key] for key in keys]
+
+    def _remember(self, maps: dict[str, Tensor]) -> None:
         for key, feature_map in maps.items():
             self._maps.put(key, feature_map)
-        return [maps[key] for key in keys]

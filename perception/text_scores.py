@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from perception.cache import LruCache
-from perception.encoders.base import Encoder, TextFeatures
+from perception.encoders.base import Encoder, TextFeatures, checked_text
 from perception.errors import InvalidTextError
 from perception.similarity import relevancy
 
@@ -13,6 +13,11 @@ DEFAULT_NEGATIVE_PROMPTS = ("object", "table", "stuff", "surface", "background")
 DEFAULT_SHARPNESS = 10.0
 MAX_TEXT_TOKENS = 77  # CLIP's context, start and end tokens included
 _NUM_CACHED_TEXTS = 64
+
+# "{}" is the text itself. CLIP was trained on captions: names of things alone are rare among them,
+# and the mean over several wordings is steadier than one (Radford et al. 2021, section 3.1.4).
+PLAIN_PROMPT = ("{}",)
+CAPTION_PROMPTS = ("{}", "a photo of {}", "a close-up photo of {}", "{} on a table")
 
 
 class TextScorer:
@@ -24,6 +29,7 @@ class TextScorer:
         *,
         negative_prompts: Sequence[str] = DEFAULT_NEGATIVE_PROMPTS,
         sharpness: float = DEFAULT_SHARPNESS,
+        prompts: Sequence[str] = PLAIN_PROMPT,
     ) -> None:
         """Prepare a scorer.
 
@@ -31,7 +37,18 @@ class TextScorer:
             encoder: The encoder whose text space the features lie in.
             negative_prompts: Texts that fit anything; see `perception.similarity.relevancy`.
             sharpness: Steepness of the relevancy.
+            prompts: Wordings that each text is put into, `{}` standing for the text; their features
+                are averaged. `CAPTION_PROMPTS` suits CLIP.
+
+        Raises:
+            InvalidTextError: If there is no wording, or one of them has no `{}`.
         """
+        if not prompts or any(prompt.count("{}") != 1 for prompt in prompts):
+            raise InvalidTextError(
+                f"Prompts are {tuple(prompts)}; expected one or more texts, each with one '{{}}' "
+                "where the text goes."
+            )
+        self.prompts = tuple(prompts)
         self.encoder = encoder
         self.negative_prompts = tuple(negative_prompts)
         self.sharpness = sharpness
@@ -70,8 +87,30 @@ class TextScorer:
         Raises:
             InvalidTextError: If the text is empty or too long.
         """
-        negatives = [self.encode(prompt) for prompt in self.negative_prompts]
-        return relevancy(features, self.encode(text), negatives, sharpness=self.sharpness)
+        negatives = [self.encode_ensemble(prompt) for prompt in self.negative_prompts]
+        wanted = self.encode_ensemble(text)
+        return relevancy(features, wanted, negatives, sharpness=self.sharpness)
+
+    def encode_ensemble(self, text: str) -> TextFeatures:
+        """Encode a text under all wordings.
+
+        Args:
+            text: Any text with at least one word.
+
+        Returns:
+            The mean of the pooled features, unit length, and the tokens under the first wording.
+
+        Raises:
+            InvalidTextError: If the text is empty or too long.
+        """
+        check_length(text)
+        checked_text(text)  # a wording would hide that there are no words
+        found = [self.encode(prompt.replace("{}", text)) for prompt in self.prompts]
+        if len(found) == 1:
+            return found[0]
+        mean = np.mean([features.pooled for features in found], axis=0)
+        mean /= np.linalg.norm(mean)
+        return TextFeatures(pooled=mean.astype(np.float32), tokens=found[0].tokens)
 
 
 def check_length(text: str) -> None:

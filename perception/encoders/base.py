@@ -2,13 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 import torch
 
 from perception.arrays import checked_array
-from perception.errors import InvalidCloudError, InvalidTextError, InvalidViewError
+from perception.errors import (
+    InvalidCloudError,
+    InvalidConfigError,
+    InvalidTextError,
+    InvalidViewError,
+)
+
+Precision = Literal["auto", "float32", "bfloat16"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,7 +70,8 @@ class Encoder(Protocol):
             images: V images, each (H, W, 3) uint8 RGB, all of one size.
 
         Returns:
-            (V, C, h, w) float32, each cell of unit length.
+            (V, C, h, w) float32, each cell of unit length; best a view of memory in which channels
+            are innermost, which lifting reads without a copy.
         """
         ...
 
@@ -125,3 +133,25 @@ def checked_text(text: str) -> str:
     if not stripped:
         raise InvalidTextError(f"Empty text {text!r}: expected at least one word.")
     return stripped
+
+
+def compute_dtype(precision: Precision) -> torch.dtype:
+    """Return the type in which an image tower computes on this machine.
+
+    Args:
+        precision: `auto` takes bfloat16 where the CPU multiplies it natively (AMX, AVX512-BF16) and
+            float32 elsewhere; features then differ slightly between machines.
+
+    Returns:
+        The type.
+
+    Raises:
+        InvalidConfigError: If there is no such precision.
+    """
+    if precision not in get_args(Precision):
+        names = ", ".join(get_args(Precision))
+        raise InvalidConfigError(f"Unknown precision {precision!r}. Precisions: {names}.")
+    if precision == "auto":
+        is_native = torch.cpu._is_amx_tile_supported() or torch.cpu._is_avx512_bf16_supported()
+        return torch.bfloat16 if is_native else torch.float32
+    return torch.bfloat16 if precision == "bfloat16" else torch.float32

@@ -73,10 +73,9 @@ def resolve_weights(architecture: str, source: str, *, allow_download: bool) -> 
         path = _download(architecture, source, cfg)
     if path is None:
         raise MissingWeightsError(
-            f"The weights of {architecture}:{source} are not on this machine (looked in "
-            f"{HF_HUB_CACHE} and {CLIP_CACHE}). Fetch them with "
-            f"`{fetch_command(architecture, source)}`, or name a file as "
-            f"{architecture}:/path/to/file."
+            f"The weights of {architecture}:{source} are not on this machine: no "
+            f"{_missing_file(cfg)}. Fetch them with `{fetch_command(architecture, source)}`, or "
+            f"name a file as {architecture}:/path/to/file."
         )
     return ClipWeights(
         architecture=architecture,
@@ -142,6 +141,17 @@ def is_torchscript(path: Path) -> bool:
         return False
     with zipfile.ZipFile(path) as archive:
         return any("/code/" in name for name in archive.namelist())
+
+
+def _missing_file(cfg: dict[str, Any]) -> str:
+    repository, file = os.path.split(cfg.get("hf_hub", ""))
+    url_file = os.path.basename(cfg.get("url", ""))
+    places = []
+    if repository:
+        places.append(f"{file or HF_SAFE_WEIGHTS_NAME} of {repository} in {HF_HUB_CACHE}")
+    if url_file:
+        places.append(f"{url_file} in {CLIP_CACHE}")
+    return " and no ".join(places)
 
 
 def _is_path(source: str) -> bool:

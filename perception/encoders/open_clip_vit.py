@@ -6,7 +6,7 @@ mixing over patches, then the final layer norm and the projection into text spac
 """
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -20,8 +20,15 @@ from open_clip.transformer import ResidualAttentionBlock, VisionTransformer
 from safetensors import SafetensorError
 from torch import Tensor, nn
 
-from perception.encoders.base import TextFeatures, checked_text, stacked_images
+from perception.encoders.base import (
+    Precision,
+    TextFeatures,
+    checked_text,
+    compute_dtype,
+    stacked_images,
+)
 from perception.encoders.clip_weights import RGB, ClipWeights, is_torchscript
+from perception.encoders.tiling import Window, blend, image_windows
 from perception.errors import InvalidConfigError, InvalidWeightsError
 
 
@@ -33,10 +40,14 @@ class VitConfig:
         num_tiles: Tiles along each side of the image, besides the whole image; 0 = whole image
             only.
         tile_overlap: Share of a tile's length that its neighbour sees too, 0..0.9.
+        precision: Arithmetic of the image tower; see `perception.encoders.base.compute_dtype`.
+        batch_size: Images and tiles that go through the network together.
     """
 
     num_tiles: int = 2
     tile_overlap: float = 1 / 3
+    precision: Precision = "auto"
+    batch_size: int = 8
 
     def __post_init__(self) -> None:
         """Check the ranges."""
@@ -45,15 +56,9 @@ class VitConfig:
                 f"num_tiles is {self.num_tiles} and tile_overlap {self.tile_overlap}, expected 0 "
                 "or more and 0..0.9."
             )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Window:
-    """A part of an image in relative coordinates, 0..1 along each axis."""
-
-    top: float
-    left: float
-    size: float
+        if self.batch_size < 1:
+            raise InvalidConfigError(f"batch_size is {self.batch_size}, expected 1 or more.")
+        compute_dtype(self.precision)
 
 
 class OpenClipVitEncoder:
@@ -82,16 +87,15 @@ class OpenClipVitEncoder:
         self.config = config or VitConfig()
         self.name = f"{architecture}:{source}"
         self._model = model.eval().requires_grad_(False)
-        self._visual = cast(VisionTransformer, model.visual)
+        self._dtype = compute_dtype(self.config.precision)
+        self.fingerprint = _fingerprint(self.name, model, self.config, self._dtype)
+        self._visual = cast(VisionTransformer, model.visual.to(self._dtype))
         self._blocks = cast(list[ResidualAttentionBlock], list(self._visual.transformer.resblocks))
         self._projection = cast(Tensor, self._visual.proj)
         self._tokenizer = open_clip.get_tokenizer(architecture)
         self._mean = torch.tensor(mean).view(3, 1, 1) * 255.0
         self._std = torch.tensor(std).view(3, 1, 1) * 255.0
         self.feature_dim = int(self._visual.output_dim)
-        self.fingerprint = _fingerprint(
-            self.name, (self._visual.conv1.weight, self._projection), self.config
-        )
 
     @classmethod
     def from_weights(
@@ -143,19 +147,20 @@ class OpenClipVitEncoder:
 
         Returns:
             (V, C, h, w) float32, each cell of unit length; h and w are the patches of all tiles
-            together.
+            together; a view with channels innermost.
         """
         pixels = torch.from_numpy(stacked_images(images)).permute(0, 3, 1, 2).float()
         pixels = (pixels - self._mean) / self._std
-        windows = list(_windows(self.config))
+        windows = image_windows(self.config.num_tiles, self.config.tile_overlap)
         grid = self._patch_grid(*pixels.shape[-2:])
+        inputs = torch.cat([self._network_input(pixels, window, grid) for window in windows])
+        features = torch.cat(
+            [self.value_features(part, grid) for part in inputs.split(self.config.batch_size)]
+        )
         smallest = min(window.size for window in windows)
-        h, w = round(grid[0] / smallest), round(grid[1] / smallest)
-        total = torch.zeros(len(pixels), self.feature_dim, h, w)
-        for window in windows:
-            features = self.value_features(self._network_input(pixels, window, grid), grid)
-            _blend(total, features, window)
-        return F.normalize(total, dim=1)
+        size = round(grid[0] / smallest), round(grid[1] / smallest)
+        maps = blend(features.unflatten(0, (len(windows), len(pixels))), windows, size)
+        return F.normalize(maps, dim=-1).permute(0, 3, 1, 2)
 
     @torch.no_grad()
     def encode_text(self, text: str) -> TextFeatures:
@@ -191,10 +196,10 @@ class OpenClipVitEncoder:
             grid: h and w, in patches; not necessarily those of the training.
 
         Returns:
-            (B, C, h, w) float32, each cell of unit length.
+            (B, h, w, C) float32, each cell of unit length.
         """
         visual = self._visual
-        x = visual.conv1(pixels).flatten(2).transpose(1, 2)
+        x = visual.conv1(pixels.to(self._dtype)).flatten(2).transpose(1, 2)
         token = visual.class_embedding.expand(len(x), 1, -1)
         x = torch.cat([token, x], dim=1) + self._position_embedding(grid)
         *blocks, last = self._blocks
@@ -205,8 +210,8 @@ class OpenClipVitEncoder:
         # MultiheadAttention stacks the input projections of queries, keys and values.
         weight, bias = last.attn.in_proj_weight.chunk(3)[2], last.attn.in_proj_bias.chunk(3)[2]
         values = last.attn.out_proj(F.linear(x, weight, bias))
-        features = F.normalize(visual.ln_post(values) @ self._projection, dim=-1)
-        return features.transpose(1, 2).unflatten(2, grid)
+        features = (visual.ln_post(values) @ self._projection).float()
+        return F.normalize(features, dim=-1).unflatten(1, grid)
 
     def _patch_grid(self, height: int, width: int) -> tuple[int, int]:
         """Return the patches of one pass: the trained number on the short side, aspect kept."""
@@ -218,13 +223,13 @@ class OpenClipVitEncoder:
         embedding = self._visual.positional_embedding
         if grid == tuple(self._visual.grid_size):
             return embedding
-        patches = embedding[1:].T.reshape(1, -1, *self._visual.grid_size)
+        patches = embedding[1:].float().T.reshape(1, -1, *self._visual.grid_size)
         resized = F.interpolate(
             patches, size=grid, mode="bicubic", antialias=True, align_corners=False
         )
-        return torch.cat([embedding[:1], resized.flatten(2)[0].T])
+        return torch.cat([embedding[:1], resized.flatten(2)[0].T.to(embedding.dtype)])
 
-    def _network_input(self, pixels: Tensor, window: _Window, grid: tuple[int, int]) -> Tensor:
+    def _network_input(self, pixels: Tensor, window: Window, grid: tuple[int, int]) -> Tensor:
         height, width = pixels.shape[-2:]
         top, left = round(window.top * height), round(window.left * width)
         bottom = round((window.top + window.size) * height)
@@ -239,47 +244,6 @@ class OpenClipVitEncoder:
         )
 
 
-def _windows(config: VitConfig) -> Iterator[_Window]:
-    """Yield the whole image, then the tiles, evenly spread."""
-    yield _Window(top=0.0, left=0.0, size=1.0)
-    n = config.num_tiles
-    if n < 2:
-        return
-    size = 1.0 / (n - (n - 1) * config.tile_overlap)
-    step = (1.0 - size) / (n - 1)
-    for i in range(n):
-        for j in range(n):
-            yield _Window(top=i * step, left=j * step, size=size)
-
-
-def _blend(total: Tensor, features: Tensor, window: _Window) -> None:
-    """Add a window's features to the map of the whole image, in place.
-
-    A tile's weight falls towards its rim, where patches lack context, and so hides its seams.
-    """
-    ys = _window_coordinates(total.shape[2], window.top, window.size)
-    xs = _window_coordinates(total.shape[3], window.left, window.size)
-    where = torch.stack(torch.meshgrid(xs, ys, indexing="xy"), dim=-1)
-    sampled = F.grid_sample(
-        features,
-        where.expand(len(features), -1, -1, -1),
-        mode="bilinear",
-        padding_mode="border",
-        align_corners=False,
-    )
-    weight = torch.ones(len(ys), len(xs))
-    if window.size < 1.0:
-        tents = [(1.0 - c.abs()).clamp(min=0.0) for c in (ys, xs)]
-        weight = tents[0][:, None] * tents[1]
-    total += weight * sampled
-
-
-def _window_coordinates(num_cells: int, start: float, size: float) -> Tensor:
-    """Return the centres of a map's cells in a window's coordinates, -1..1 inside of it."""
-    centers = (torch.arange(num_cells) + 0.5) / num_cells
-    return (centers - start) / size * 2.0 - 1.0
-
-
 def _read_state(weights: ClipWeights, model: nn.Module) -> dict[str, Tensor]:
     if is_torchscript(weights.path):
         archive = cast(nn.Module, torch.jit.load(weights.path, map_location="cpu"))
@@ -292,9 +256,11 @@ def _read_state(weights: ClipWeights, model: nn.Module) -> dict[str, Tensor]:
     return {name: tensor.float() for name, tensor in state.items()}
 
 
-def _fingerprint(name: str, tensors: Sequence[Tensor], config: VitConfig) -> str:
+def _fingerprint(name: str, model: CLIP, config: VitConfig, dtype: torch.dtype) -> str:
+    tiling = (config.num_tiles, config.tile_overlap)
+    digest = hashlib.sha256(f"{name}|{tiling}|{dtype}".encode())
     # The first and last weights stand for all: hashing a gigabyte would take seconds.
-    digest = hashlib.sha256(f"{name}|{config}".encode())
-    for tensor in tensors:
+    visual = cast(VisionTransformer, model.visual)
+    for tensor in (visual.conv1.weight, cast(Tensor, visual.proj)):
         digest.update(tensor.detach().float().numpy().tobytes())
     return f"{name}-{digest.hexdigest()[:16]}"

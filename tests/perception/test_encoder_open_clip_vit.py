@@ -1,5 +1,8 @@
 import zipfile
+from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import open_clip
@@ -12,6 +15,7 @@ from safetensors.torch import save_file
 from perception.encoders.base import Encoder
 from perception.encoders.clip_weights import ClipWeights, resolve_weights
 from perception.encoders.open_clip_vit import OpenClipVitEncoder, VitConfig
+from perception.encoders.tiling import blend, image_windows
 from perception.errors import InvalidConfigError, InvalidTextError, InvalidWeightsError
 
 GRID = (4, 4)
@@ -27,9 +31,12 @@ def clip() -> CLIP:
     return CLIP(24, vision, text, quick_gelu=True).eval()  # pyright: ignore[reportArgumentType]
 
 
-def _encoder(clip: CLIP, config: VitConfig | None = None) -> OpenClipVitEncoder:
+EXACT = VitConfig(precision="float32")
+
+
+def _encoder(clip: CLIP, config: VitConfig = EXACT) -> OpenClipVitEncoder:
     return OpenClipVitEncoder(
-        clip, architecture="ViT-B-16", source="tiny", mean=MEAN, std=STD, config=config
+        deepcopy(clip), architecture="ViT-B-16", source="tiny", mean=MEAN, std=STD, config=config
     )
 
 
@@ -61,7 +68,7 @@ def _value_path_by_hand(state: dict[str, torch.Tensor], pixels: np.ndarray) -> n
     x = norm(x[1:], f"{last}.ln_1") @ w[f"{last}.attn.in_proj_weight"][96:].T
     x = (x + w[f"{last}.attn.in_proj_bias"][96:]) @ w[f"{last}.attn.out_proj.weight"].T
     x = norm(x + w[f"{last}.attn.out_proj.bias"], "ln_post") @ w["proj"]
-    return (x / x.norm(dim=-1, keepdim=True)).T.reshape(24, 4, 4).numpy()
+    return (x / x.norm(dim=-1, keepdim=True)).reshape(4, 4, 24).numpy()
 
 
 def test_value_path_equals_a_rebuild_by_hand(clip: CLIP) -> None:
@@ -91,7 +98,7 @@ def test_text_equals_open_clip(clip: CLIP) -> None:
 
 def test_aspect_ratio_is_kept_and_tiles_add_resolution(clip: CLIP) -> None:
     image = np.random.default_rng(1).integers(0, 256, (72, 128, 3), dtype=np.uint8)
-    whole = _encoder(clip, VitConfig(num_tiles=0)).encode_dense([image])
+    whole = _encoder(clip, replace(EXACT, num_tiles=0)).encode_dense([image])
     assert whole.shape == (1, 24, 4, 7)
     tiled = _encoder(clip).encode_dense([image, image])
     assert tiled.shape == (2, 24, 7, 12)
@@ -101,23 +108,69 @@ def test_aspect_ratio_is_kept_and_tiles_add_resolution(clip: CLIP) -> None:
 
 def test_whole_image_alone_is_the_plain_pass(clip: CLIP) -> None:
     image = np.random.default_rng(2).integers(0, 256, (32, 32, 3), dtype=np.uint8)
-    encoder = _encoder(clip, VitConfig(num_tiles=0))
+    encoder = _encoder(clip, replace(EXACT, num_tiles=0))
     pixels = (image / 255.0 - MEAN) / STD
     with torch.no_grad():
         plain = encoder.value_features(
             torch.from_numpy(pixels).permute(2, 0, 1)[None].float(), GRID
-        )
+        ).permute(0, 3, 1, 2)
     torch.testing.assert_close(encoder.encode_dense([image]), plain, atol=1e-5, rtol=0)
 
 
 def test_constant_image_gives_one_feature_under_any_tiling(clip: CLIP) -> None:
     """Blending is a weighted mean: where all windows agree, it changes nothing."""
+    clip = deepcopy(clip)
+    positions = cast(torch.Tensor, clip.visual.positional_embedding)
     with torch.no_grad():
-        clip.visual.positional_embedding[1:] = clip.visual.positional_embedding[1]
+        positions[1:] = positions[1]
     image = np.full((32, 32, 3), 90, np.uint8)
-    whole = _encoder(clip, VitConfig(num_tiles=0)).encode_dense([image])[0, :, 0, 0]
-    tiled = _encoder(clip, VitConfig(num_tiles=3)).encode_dense([image])[0]
+    whole = _encoder(clip, replace(EXACT, num_tiles=0)).encode_dense([image])[0, :, 0, 0]
+    tiled = _encoder(clip, replace(EXACT, num_tiles=3)).encode_dense([image])[0]
     torch.testing.assert_close(tiled, whole[:, None, None].expand_as(tiled), atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("batch_size", [1, 2, 100])
+def test_batches_change_nothing(clip: CLIP, batch_size: int) -> None:
+    image = np.random.default_rng(3).integers(0, 256, (2, 40, 64, 3), dtype=np.uint8)
+    one = _encoder(clip, replace(EXACT, batch_size=batch_size)).encode_dense(list(image))
+    torch.testing.assert_close(one, _encoder(clip).encode_dense(list(image)), atol=1e-5, rtol=0)
+
+
+def test_bfloat16_is_near_float32_and_has_its_own_fingerprint(clip: CLIP) -> None:
+    image = np.random.default_rng(4).integers(0, 256, (40, 64, 3), dtype=np.uint8)
+    half, full = _encoder(clip, VitConfig(precision="bfloat16")), _encoder(clip)
+    cosine = (half.encode_dense([image]) * full.encode_dense([image])).sum(dim=1)
+    assert cosine.min() > 0.995
+    assert half.fingerprint != full.fingerprint
+    text = half.encode_text("pear").pooled
+    np.testing.assert_array_equal(text, full.encode_text("pear").pooled)
+
+
+def test_maps_have_channels_innermost(clip: CLIP) -> None:
+    maps = _encoder(clip).encode_dense([np.zeros((32, 48, 3), np.uint8)])
+    assert maps.is_contiguous(memory_format=torch.channels_last)
+
+
+def test_tiles_show_their_own_part_of_the_image(clip: CLIP) -> None:
+    """What one tile says reaches no cell outside of it."""
+    windows = image_windows(2, 1 / 3)
+    grids = torch.rand(len(windows), 1, 4, 4, 2)
+    grids[0] = 0.0  # without the whole image only tiles speak
+    other = grids.clone()
+    other[4] += 1.0  # the tile at the lower right
+    one, two = blend(grids, windows, (7, 7)), blend(other, windows, (7, 7))
+    is_other = (one != two).any(dim=-1)[0]
+    assert is_other[3:, 3:].all()
+    assert not is_other[:2].any() and not is_other[:, :2].any()
+
+
+def test_windows_cover_the_image_and_overlap() -> None:
+    windows = image_windows(3, 0.25)
+    assert len(windows) == 10
+    tops = sorted({window.top for window in windows[1:]})
+    size = windows[1].size
+    assert tops[-1] + size == pytest.approx(1.0)
+    assert (tops[0] + size - tops[1]) / size == pytest.approx(0.25)
 
 
 def test_empty_text(clip: CLIP) -> None:
@@ -157,3 +210,19 @@ def test_torchscript_archives_are_taken_for_openai(tmp_path: Path) -> None:
 def test_bad_config(fields: dict[str, float]) -> None:
     with pytest.raises(InvalidConfigError, match=r"expected 0 or more and 0\.\.0\.9\."):
         VitConfig(**fields)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"batch_size": 0}, "batch_size is 0, expected 1 or more."),
+        (
+            {"precision": "half"},
+            "Unknown precision 'half'. Precisions: auto, float32, bfloat16.",
+        ),
+    ],
+)
+def test_bad_batch_or_precision(fields: dict[str, object], message: str) -> None:
+    with pytest.raises(InvalidConfigError) as caught:
+        VitConfig(**fields)  # pyright: ignore[reportArgumentType]
+    assert str(caught.value) == message

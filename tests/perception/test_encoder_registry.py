@@ -70,8 +70,9 @@ def test_missing_weights_name_the_caches_and_the_command(empty_caches: Path) -> 
     with pytest.raises(MissingWeightsError) as caught:
         load_encoder("ViT-L-14")
     assert str(caught.value) == (
-        "The weights of ViT-L-14:openai are not on this machine (looked in "
-        f"{empty_caches / 'hub'} and {empty_caches / 'clip'}). Fetch them with `hf download "
+        "The weights of ViT-L-14:openai are not on this machine: no open_clip_model.safetensors of "
+        f"timm/vit_large_patch14_clip_224.openai in {empty_caches / 'hub'} and no ViT-L-14.pt in "
+        f"{empty_caches / 'clip'}. Fetch them with `hf download "
         "timm/vit_large_patch14_clip_224.openai open_clip_model.safetensors`, or name a file as "
         "ViT-L-14:/path/to/file."
     )

@@ -41,8 +41,8 @@ def test_points_lie_on_the_surfaces(table_views: tuple[CameraView, ...]) -> None
 
 def test_cloud_stays_inside_the_workspace(table_views: tuple[CameraView, ...]) -> None:
     points = fuse(table_views, CONFIG).points
-    assert (points >= np.float32(CONFIG.workspace_min)).all()
-    assert (points <= np.float32(CONFIG.workspace_max)).all()
+    assert (points >= np.asarray(CONFIG.workspace_min, np.float32)).all()
+    assert (points <= np.asarray(CONFIG.workspace_max, np.float32)).all()
 
 
 def test_normals_point_outwards(table_views: tuple[CameraView, ...]) -> None:
@@ -161,6 +161,12 @@ def test_nothing_in_the_workspace(table_views: tuple[CameraView, ...]) -> None:
         ),
         ({"voxel_size_m": 0.0}, "voxel_size_m is 0.0, expected more than 0 m."),
         ({"normal_radius_m": -1.0}, "normal_radius_m is -1.0, expected more than 0 m."),
+        ({"method": "poisson"}, "Unknown method 'poisson'. Methods: voxel_means, tsdf."),
+        ({"table": "drop"}, "table is 'drop', expected 'keep' or 'remove'."),
+        (
+            {"tsdf_truncation_voxels": 0.5},
+            "tsdf_truncation_voxels is 0.5, expected 1 or more.",
+        ),
     ],
 )
 def test_bad_config(fields: dict[str, object], message: str) -> None:

@@ -10,7 +10,9 @@ from perception.encoders.base import TextFeatures
 from perception.errors import EmptyCloudError, InvalidConfigError, InvalidTextError
 from perception.fusion import FusionConfig
 from perception.lifter import LifterConfig, MultiViewLifter
+from perception.lifting import LiftingConfig
 from perception.similarity import relevancy
+from perception.text_scores import TextScorer
 from perception.views import CameraView
 
 WORDS = {"red": 0, "green": 1, "blue": 2}
@@ -135,6 +137,37 @@ def test_empty_instruction(lifter: MultiViewLifter, table_views: tuple[CameraVie
         lifter.perceive(table_views, "")
 
 
+def test_wordings_are_averaged(table_views: tuple[CameraView, ...]) -> None:
+    encoder = ColorEncoder()
+    scorer = TextScorer(encoder, prompts=("{}", "a photo of {} blue"), negative_prompts=())
+    found = scorer.encode_ensemble("red")
+    wanted = encoder.encode_text("red").pooled + encoder.encode_text("a photo of red blue").pooled
+    np.testing.assert_allclose(found.pooled, wanted / np.linalg.norm(wanted), atol=1e-6)
+    assert len(found.tokens) == 1
+    config = LifterConfig(prompts=("{} blue",), negative_prompts=())
+    percept = MultiViewLifter(encoder, config).perceive(table_views, "thing")
+    best = percept.features.points[percept.features.similarity.argmax()]
+    assert np.linalg.norm(best[:2] - (0.6, -0.05)) < 0.06
+
+
+@pytest.mark.parametrize("prompts", [(), ("a photo",), ("{} or {}",)])
+def test_wordings_without_a_place_for_the_text(prompts: tuple[str, ...]) -> None:
+    with pytest.raises(InvalidTextError, match=r"expected one or more texts, each with one '\{\}'"):
+        TextScorer(ColorEncoder(), prompts=prompts)
+
+
+def test_a_wording_does_not_hide_an_empty_text() -> None:
+    with pytest.raises(InvalidTextError, match="Empty text"):
+        TextScorer(ColorEncoder(), prompts=("a photo of {}",)).encode_ensemble(" ")
+
+
+def test_maps_in_half_precision(table_views: tuple[CameraView, ...]) -> None:
+    config = LifterConfig(lifting=LiftingConfig(precision="bfloat16"))
+    half = MultiViewLifter(ColorEncoder(), config).perceive(table_views, "red").features
+    full = MultiViewLifter(ColorEncoder()).perceive(table_views, "red").features
+    np.testing.assert_allclose(half.features, full.features, atol=0.01)
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
@@ -156,7 +189,8 @@ def test_bad_config(fields: dict[str, float], message: str) -> None:
 
 
 def _text(*values: float) -> TextFeatures:
-    pooled = np.float32(values) / np.linalg.norm(values).astype(np.float32)
+    pooled = np.asarray(values, np.float32)
+    pooled /= np.linalg.norm(pooled)
     return TextFeatures(pooled=pooled, tokens=pooled[None])
 
 

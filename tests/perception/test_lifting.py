@@ -109,6 +109,41 @@ def test_order_of_views_does_not_matter(table_views: tuple[CameraView, ...]) -> 
     np.testing.assert_allclose(forward.confidence, backward.confidence, atol=1e-7)
 
 
+@pytest.mark.parametrize("rule", ["margin", "ratio"])
+def test_doubling_mu_widens_the_weight(rule: str) -> None:
+    """Eq. (1) knows only the ratio of deviation and mu."""
+    delta = np.linspace(-0.03, 0.15, 1000)
+    one, two = (LiftingConfig(mu_m=mu, weight_rule=rule) for mu in (0.02, 0.04))  # pyright: ignore[reportArgumentType]
+    np.testing.assert_allclose(depth_weights(2 * delta, two), depth_weights(delta, one), atol=1e-12)
+    assert (depth_weights(delta, two) >= depth_weights(delta, one)).all()
+
+
+def test_one_tensor_and_a_list_of_maps_give_the_same(
+    table_views: tuple[CameraView, ...],
+) -> None:
+    rng = np.random.default_rng(4)
+    inner = torch.from_numpy(rng.normal(size=(3, 9, 16, 8)).astype(np.float32))
+    stacked = inner.permute(0, 3, 1, 2)
+    listed = [feature_map.contiguous() for feature_map in stacked]
+    points = _table_points(1500)  # more than one chunk
+    one = lift_features(points, table_views, stacked, CONFIG)
+    other = lift_features(points, table_views, listed, CONFIG)
+    assert one.features.tobytes() == other.features.tobytes()
+
+
+def test_bfloat16_turns_features_by_less_than_half_a_degree(
+    table_views: tuple[CameraView, ...],
+) -> None:
+    rng = np.random.default_rng(5)
+    maps = torch.from_numpy(rng.normal(size=(3, 64, 9, 16)).astype(np.float32))
+    full = lift_features(_table_points(), table_views, maps, CONFIG)
+    half = lift_features(_table_points(), table_views, maps, LiftingConfig(precision="bfloat16"))
+    assert half.features.dtype == np.float32
+    chord = np.linalg.norm(full.features.astype(float) - half.features, axis=1)
+    assert np.degrees(2 * np.arcsin(chord / 2)).max() < 0.5
+    np.testing.assert_array_equal(full.confidence, half.confidence)
+
+
 def test_maps_may_differ_in_size(table_views: tuple[CameraView, ...]) -> None:
     fine = [_position_map(view, 18, 32) for view in table_views]
     mixed = [fine[0], _position_map(table_views[1], 9, 16), _position_map(table_views[2], 36, 64)]
@@ -136,6 +171,7 @@ def test_bad_maps(table_views: tuple[CameraView, ...]) -> None:
     [
         ({"mu_m": 0.0}, "mu_m is 0.0, expected more than 0 m."),
         ({"weight_rule": "half"}, "Unknown weight_rule 'half'. Rules: margin, ratio."),
+        ({"precision": "int8"}, "Unknown precision 'int8'. Precisions: float32, bfloat16."),
     ],
 )
 def test_bad_config(fields: dict[str, object], message: str) -> None:
