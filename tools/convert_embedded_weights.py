@@ -6,7 +6,10 @@ Sources (both Apache-2.0 upstream), as packages that only this tool needs:
 
 Run from the root of the repository:
 
-    python tools/convert_embedded_weights.py
+    python -m tools.convert_embedded_weights
+
+The trained head comes from `python -m tools.train_embedded_encoder export`; where there is none
+yet, one is written that does nothing but the class-name mixture.
 """
 
 import argparse
@@ -25,6 +28,7 @@ from torch import Tensor
 from transformers import AutoModel, AutoTokenizer
 
 from perception.encoders.embedded import (
+    HEAD_WEIGHTS,
     IMAGE_WEIGHTS,
     TEXT_CONFIG,
     TEXT_WEIGHTS,
@@ -34,6 +38,7 @@ from perception.encoders.embedded import (
     EmbeddedEncoder,
     EmbeddedEncoderConfig,
 )
+from tools.encoder.export import export_untrained_head
 
 MAX_BYTES = 64_000_000
 GOLDEN_PATH = Path(__file__).resolve().parents[1] / "tests" / "golden" / "embedded_encoder.npz"
@@ -176,7 +181,7 @@ def verify(folder: Path) -> None:
 
     pixels = torch.from_numpy(checker_image()).permute(2, 0, 1)[None] / 127.5 - 1
     features = encoder._trunk.forward_features(pixels).mean(dim=(2, 3))
-    logits = encoder.head.class_logits(features)
+    logits = encoder.head.mixture.class_logits(features)
     weights = original_image_weights()
     rounded = {name: half(tensor).float() for name, tensor in weights.items()}
     scale = logits.std()
@@ -211,13 +216,18 @@ def write_golden(folder: Path) -> None:
         folder: Folder with the written files.
     """
     encoder = EmbeddedEncoder(EmbeddedEncoderConfig(precision="float32"), folder)
+    untrained = EmbeddedEncoder(
+        EmbeddedEncoderConfig(precision="float32", mixture_share=1.0), folder
+    )
     dense = encoder.encode_dense([checker_image(48, 80)])
+    mixture = untrained.encode_dense([checker_image(48, 80)])
     np.savez_compressed(
         GOLDEN_PATH,
         texts=np.array(GOLDEN_TEXTS),
         text_pooled=original_text_embeddings(list(GOLDEN_TEXTS)).numpy(),
         image=checker_image(48, 80),
         dense_corner=dense[0, :, ::8, ::8].numpy(),
+        mixture_corner=mixture[0, :, ::8, ::8].numpy(),
     )
 
 
@@ -225,10 +235,19 @@ def main() -> None:
     """Convert, verify and write the golden arrays."""
     parser = argparse.ArgumentParser(description="Make the weight files of the embedded encoder.")
     parser.add_argument("--output", type=Path, default=WEIGHTS_DIR, help="folder to write to")
-    folder = parser.parse_args().output
+    parser.add_argument(
+        "--golden-only", action="store_true", help="only write the reference arrays of the tests"
+    )
+    arguments = parser.parse_args()
+    folder = arguments.output
+    if arguments.golden_only:
+        write_golden(folder)
+        return
     folder.mkdir(parents=True, exist_ok=True)
     write_image_weights(folder)
     write_text_tower(folder)
+    if not (folder / HEAD_WEIGHTS).exists():
+        export_untrained_head(folder)
     for name in WEIGHT_FILES:
         (folder / name).chmod(0o644)  # safetensors writes files that only their owner may read
     verify(folder)

@@ -7,6 +7,7 @@ the wrapper `perception_efficientnet_lite0` is registered with timm here.
 from typing import Any, cast
 
 import timm
+import torch
 import torch.nn.functional as F
 from timm.layers import BatchNormAct2d
 from timm.models import EfficientNet, register_model
@@ -15,6 +16,11 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 TRUNK_NAME = "perception_efficientnet_lite0"
 OUTPUT_STRIDE = 16
+
+# Stages with output strides 8 and 16, and the edge of the squares of a cell's mean colours.
+_SURFACE_STAGE, _PART_STAGE, _COLOR_PX = 2, 4, 4
+NUM_FINAL_FEATURES = 1280
+NUM_CELL_FEATURES = NUM_FINAL_FEATURES + 112 + 40 + 3 * (OUTPUT_STRIDE // _COLOR_PX) ** 2
 
 # With these weights and output stride 16, a cell looks about 6 pixels to the left of its middle,
 # and above it: TensorFlow's "same" padding centres output j of a stride-2 convolution on input
@@ -67,6 +73,33 @@ def fold_batch_norm(trunk: EfficientNet) -> EfficientNet:
             setattr(module, conv_name, fuse_conv_bn_eval(conv, plain))
             setattr(module, norm_name, norm.act)
     return trunk
+
+
+def cell_features(trunk: EfficientNet, pixels: Tensor) -> Tensor:
+    """Describe every cell of 16 x 16 pixels: what is there, what it is made of, its colours.
+
+    The last stage of a network trained to name things has given up much of their colour and
+    surface; therefore two earlier stages and the pixels themselves are kept beside it.
+
+    Args:
+        trunk: The network, folded or not, in evaluation mode.
+        pixels: (V, 3, H, W) from `to_network_input`, in the network's type.
+
+    Returns:
+        (V, H / 16, W / 16, NUM_CELL_FEATURES) in the network's type: the 1280 features before the
+        classifier first.
+    """
+    x = trunk.bn1(trunk.conv_stem(pixels))
+    early = {}
+    for index, stage in enumerate(trunk.blocks):
+        x = stage(x)
+        early[index] = x
+    final = trunk.bn2(trunk.conv_head(x))
+    surface = F.avg_pool2d(early[_SURFACE_STAGE], OUTPUT_STRIDE // 8)
+    shift = _ALIGNMENT_PX  # colours lie where they are: undo the alignment
+    unmoved = F.pad(pixels, (shift, 0, shift, 0), mode="replicate")[..., :-shift, :-shift]
+    colors = F.pixel_unshuffle(F.avg_pool2d(unmoved, _COLOR_PX), OUTPUT_STRIDE // _COLOR_PX)
+    return torch.cat([final, early[_PART_STAGE], surface, colors], dim=1).permute(0, 2, 3, 1)
 
 
 def to_network_input(images: Tensor, size: tuple[int, int]) -> Tensor:

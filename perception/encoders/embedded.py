@@ -1,9 +1,10 @@
 """The encoder that ships with the package: no download, no training, about 55 MB.
 
 Image tower: EfficientNet-Lite0 (ImageNet weights). Text tower: all-MiniLM-L6-v2. Both are built by
-open_clip as one custom model. They were never trained together; `ClassMixtureHead` aligns them
-through the names of the ImageNet classes. It is a stand-in for CLIP where CLIP's weights are not at
-hand: it knows what ImageNet knows, and little of colours.
+open_clip as one custom model, and both stay as they were; `GroundingHead` between them was trained
+on rendered household objects (weights/embedded/MODEL_CARD.md). It is a stand-in for CLIP where
+CLIP's weights are not at hand: it knows names, colours and uses of tabletop objects, and beyond
+them what the names of the ImageNet classes say.
 """
 
 import hashlib
@@ -20,23 +21,30 @@ from open_clip.model import CustomTextCLIP
 from safetensors.torch import load_file
 from timm.models import EfficientNet
 from tokenizers import Tokenizer
-from torch import Tensor
+from torch import Tensor, nn
 
 from perception.encoders.base import TextFeatures, checked_text, stacked_images
-from perception.encoders.class_mixture import ClassMixtureHead
-from perception.encoders.efficientnet import TRUNK_NAME, fold_batch_norm, to_network_input
+from perception.encoders.efficientnet import (
+    NUM_FINAL_FEATURES,
+    TRUNK_NAME,
+    cell_features,
+    fold_batch_norm,
+    to_network_input,
+)
+from perception.encoders.head import GroundingHead
 from perception.errors import InvalidConfigError, InvalidWeightsError, MissingWeightsError
 
 WEIGHTS_DIR = Path(__file__).resolve().parents[1] / "weights" / "embedded"
 IMAGE_WEIGHTS = "image.safetensors"
+HEAD_WEIGHTS = "head.safetensors"
 TEXT_WEIGHTS = "text.safetensors"
 TOKENIZER = "tokenizer.json"
 TEXT_CONFIG = "config.json"
-WEIGHT_FILES = (IMAGE_WEIGHTS, TEXT_WEIGHTS, TOKENIZER, TEXT_CONFIG)
+WEIGHT_FILES = (IMAGE_WEIGHTS, HEAD_WEIGHTS, TEXT_WEIGHTS, TOKENIZER, TEXT_CONFIG)
 
 TEXT_DIM = 384
-NUM_IMAGE_FEATURES = 1280
 NUM_CLASSES = 1000
+_TEXTS_PER_BATCH = 256
 MAX_TOKENS = 256  # the length that all-MiniLM-L6-v2 was trained for
 
 Precision = Literal["auto", "float32", "bfloat16"]
@@ -49,6 +57,8 @@ class EmbeddedEncoderConfig:
     Attributes:
         long_side: Length in pixels to which an image's longer side is resized, a multiple of 32.
         temperature: Softening of the class probabilities.
+        mixture_share: Weight of the class-name mixture beside the trained projection, in 0..1; 1 is
+            the mixture alone, without any training. None takes the weight stored with the head.
         precision: Arithmetic of the image tower. `auto` takes bfloat16 where the CPU multiplies it
             natively (AMX, AVX512-BF16) and float32 elsewhere; features then differ slightly
             between machines.
@@ -56,6 +66,7 @@ class EmbeddedEncoderConfig:
 
     long_side: int = 960
     temperature: float = 2.0
+    mixture_share: float | None = None
     precision: Precision = "auto"
 
     def __post_init__(self) -> None:
@@ -67,6 +78,10 @@ class EmbeddedEncoderConfig:
         if not self.temperature > 0:
             raise InvalidConfigError(
                 f"temperature is {self.temperature}, expected a positive number."
+            )
+        if self.mixture_share is not None and not 0 <= self.mixture_share <= 1:
+            raise InvalidConfigError(
+                f"mixture_share is {self.mixture_share}, expected a number in 0..1 or None."
             )
         if self.precision not in get_args(Precision):
             names = ", ".join(get_args(Precision))
@@ -108,12 +123,12 @@ class EmbeddedEncoder:
         self._tokenizer.no_padding()
         self._tokenizer.enable_truncation(MAX_TOKENS)
         model = build_open_clip_model(weights_dir)
-        self.head = ClassMixtureHead(
-            num_features=NUM_IMAGE_FEATURES, num_classes=NUM_CLASSES, text_dim=TEXT_DIM
-        )
+        self.head = GroundingHead(num_classes=NUM_CLASSES, text_dim=TEXT_DIM)
         _load_weights(model, self.head, weights_dir)
         model.requires_grad_(False)
         self.head.requires_grad_(False)
+        if self.config.mixture_share is not None:
+            self.head.mixture_share.fill_(self.config.mixture_share)
         self._text_tower = cast(HFTextEncoder, model.text)
         trunk = fold_batch_norm(cast(EfficientNet, model.get_submodule("visual.trunk")))
         self._trunk = trunk.to(self._dtype).to(memory_format=torch.channels_last)
@@ -142,10 +157,22 @@ class EmbeddedEncoder:
         Returns:
             (V, h, w, 1280) features before the classifier, in the tower's type.
         """
+        return self.encode_cells(images)[..., :NUM_FINAL_FEATURES]
+
+    @torch.no_grad()
+    def encode_cells(self, images: Sequence[np.ndarray]) -> Tensor:
+        """Encode images into what the head reads.
+
+        Args:
+            images: V images, each (H, W, 3) uint8 RGB, all of one size.
+
+        Returns:
+            (V, h, w, NUM_CELL_FEATURES); see `perception.encoders.efficientnet.cell_features`.
+        """
         batch = torch.from_numpy(stacked_images(images)).permute(0, 3, 1, 2)
         pixels = to_network_input(batch, self.network_size(*batch.shape[-2:]))
         pixels = pixels.to(dtype=self._dtype, memory_format=torch.channels_last)
-        return self._trunk.forward_features(pixels).permute(0, 2, 3, 1)
+        return cell_features(self._trunk, pixels)
 
     @torch.no_grad()
     def encode_dense(self, images: Sequence[np.ndarray]) -> Tensor:
@@ -157,7 +184,7 @@ class EmbeddedEncoder:
         Returns:
             (V, 384, h, w) float32, each cell of unit length; a view with channels innermost.
         """
-        features = self.head(self.encode_trunk(images), self.config.temperature)
+        features = self.head(self.encode_cells(images), self.config.temperature)
         return features.permute(0, 3, 1, 2)
 
     @torch.no_grad()
@@ -176,6 +203,29 @@ class EmbeddedEncoder:
         ids = torch.tensor([self._tokenizer.encode(checked_text(text)).ids])
         pooled, tokens = self._text_tower(ids)
         return TextFeatures(pooled=F.normalize(pooled, dim=-1)[0].numpy(), tokens=tokens[0].numpy())
+
+    @torch.no_grad()
+    def encode_texts(self, texts: Sequence[str]) -> np.ndarray:
+        """Encode many texts, those of one length together.
+
+        Args:
+            texts: N texts with at least one word each.
+
+        Returns:
+            (N, 384) float32 pooled features, unit rows.
+
+        Raises:
+            InvalidTextError: If one is empty.
+        """
+        ids = [self._tokenizer.encode(checked_text(text)).ids for text in texts]
+        lengths = np.array([len(row) for row in ids])
+        pooled = np.empty((len(texts), TEXT_DIM), np.float32)
+        for length in np.unique(lengths):
+            rows = np.flatnonzero(lengths == length)
+            for part in np.array_split(rows, -(-len(rows) // _TEXTS_PER_BATCH)):
+                batch = torch.tensor([ids[row] for row in part])
+                pooled[part] = F.normalize(self._text_tower(batch)[0], dim=-1).numpy()
+        return pooled
 
 
 def build_open_clip_model(text_config_dir: Path) -> CustomTextCLIP:
@@ -209,32 +259,48 @@ def _require_files(weights_dir: Path) -> None:
         raise MissingWeightsError(
             f"The embedded encoder misses {', '.join(missing)} in {weights_dir}; expected "
             f"{', '.join(WEIGHT_FILES)}. Reinstall the package, or make them with "
-            "`python tools/convert_embedded_weights.py`."
+            "`python -m tools.convert_embedded_weights` and `python -m "
+            "tools.train_embedded_encoder export`."
         )
 
 
-def _load_weights(model: CustomTextCLIP, head: ClassMixtureHead, weights_dir: Path) -> None:
-    image = {
-        name: tensor.float() for name, tensor in load_file(weights_dir / IMAGE_WEIGHTS).items()
-    }
-    text = {name: tensor.float() for name, tensor in load_file(weights_dir / TEXT_WEIGHTS).items()}
+def _load_weights(model: CustomTextCLIP, head: GroundingHead, weights_dir: Path) -> None:
+    convert = "python -m tools.convert_embedded_weights"
+    export = "python -m tools.train_embedded_encoder export"
+    trained = nn.ModuleDict({"hidden": head.hidden, "projection": head.projection})
     parts = (
-        (model.get_submodule("visual.trunk"), "trunk.", image, IMAGE_WEIGHTS),
-        (head, "head.", image, IMAGE_WEIGHTS),
-        (model.get_submodule("text.transformer"), "", text, TEXT_WEIGHTS),
+        (model.get_submodule("visual.trunk"), "trunk.", IMAGE_WEIGHTS, convert),
+        (head.mixture, "head.", IMAGE_WEIGHTS, convert),
+        (trained, "trained.", HEAD_WEIGHTS, export),
+        (model.get_submodule("text.transformer"), "", TEXT_WEIGHTS, convert),
     )
-    for module, prefix, tensors, file in parts:
+    files = {name: _load_floats(weights_dir / name) for name in {part[2] for part in parts}}
+    for module, prefix, file, command in parts:
+        tensors = files[file]
         state = {k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)}
         try:
             module.load_state_dict(state, strict=True, assign=True)
         except RuntimeError as error:
-            raise InvalidWeightsError(
-                f"{weights_dir / file} does not fit {type(module).__name__}: expected the tensors "
-                "that `python tools/convert_embedded_weights.py` writes. Run it again."
-            ) from error
+            raise _wrong_weights(weights_dir / file, type(module).__name__, command) from error
+    share = files[HEAD_WEIGHTS].get("mixture_share")
+    if share is None:
+        raise _wrong_weights(weights_dir / HEAD_WEIGHTS, type(head).__name__, export)
+    head.mixture_share = share
+
+
+def _load_floats(file: Path) -> dict[str, Tensor]:
+    return {name: tensor.float() for name, tensor in load_file(file).items()}
+
+
+def _wrong_weights(file: Path, module: str, command: str) -> InvalidWeightsError:
+    return InvalidWeightsError(
+        f"{file} does not fit {module}: expected the tensors that `{command}` writes. Run it again."
+    )
 
 
 def _fingerprint(weights_dir: Path, config: EmbeddedEncoderConfig, dtype: torch.dtype) -> str:
-    digest = hashlib.sha256(f"{config.long_side}|{config.temperature}|{dtype}".encode())
-    digest.update((weights_dir / IMAGE_WEIGHTS).read_bytes())
+    settings = (config.long_side, config.temperature, config.mixture_share, dtype)
+    digest = hashlib.sha256("|".join(map(str, settings)).encode())
+    for name in (IMAGE_WEIGHTS, HEAD_WEIGHTS):
+        digest.update((weights_dir / name).read_bytes())
     return f"embedded-{digest.hexdigest()[:16]}"

@@ -11,11 +11,13 @@ import torch.nn.functional as F
 
 from perception.encoders import efficientnet
 from perception.encoders.base import Encoder
+from perception.encoders.efficientnet import NUM_CELL_FEATURES
 from perception.encoders.embedded import (
     WEIGHTS_DIR,
     EmbeddedEncoder,
     EmbeddedEncoderConfig,
 )
+from perception.encoders.head import GroundingHead
 from perception.errors import (
     InvalidConfigError,
     InvalidTextError,
@@ -85,8 +87,8 @@ def test_mean_of_dense_logits_is_the_pooled_classification(
     encoder: EmbeddedEncoder, image: np.ndarray
 ) -> None:
     features = encoder.encode_trunk([image])
-    dense_mean = encoder.head.class_logits(features).mean(dim=(1, 2))
-    pooled = encoder.head.class_logits(features.mean(dim=(1, 2)))
+    dense_mean = encoder.head.mixture.class_logits(features).mean(dim=(1, 2))
+    pooled = encoder.head.mixture.class_logits(features.mean(dim=(1, 2)))
     assert (dense_mean - pooled).abs().max() < 1e-4
 
 
@@ -95,6 +97,50 @@ def test_dense_features_equal_the_golden_ones(golden: dict[str, np.ndarray]) -> 
     dense = encoder.encode_dense([golden["image"]])[0, :, ::8, ::8].numpy()
     cosine = np.einsum("chw,chw->hw", dense, golden["dense_corner"])
     assert cosine.min() > 0.999
+
+
+def test_full_share_is_the_untrained_mixture(golden: dict[str, np.ndarray]) -> None:
+    encoder = EmbeddedEncoder(EmbeddedEncoderConfig(precision="float32", mixture_share=1.0))
+    dense = encoder.encode_dense([golden["image"]])[0, :, ::8, ::8].numpy()
+    cosine = np.einsum("chw,chw->hw", dense, golden["mixture_corner"])
+    assert cosine.min() > 0.999
+    assert np.einsum("chw,chw->hw", dense, golden["dense_corner"]).max() < 0.99
+
+
+def test_texts_together_equal_texts_alone(encoder: EmbeddedEncoder) -> None:
+    texts = ["pear", "a red mug", "plum", "something to eat", "a blue mug"]
+    alone = np.stack([encoder.encode_text(text).pooled for text in texts])
+    np.testing.assert_allclose(encoder.encode_texts(texts), alone, atol=1e-5)
+
+
+def test_head_adds_unit_vectors_by_share() -> None:
+    torch.manual_seed(0)
+    head = GroundingHead(num_classes=7, text_dim=5)
+    torch.nn.init.normal_(head.mixture.class_embeddings)
+    head.mixture_share.fill_(0.3)
+    cells = torch.randn(4, NUM_CELL_FEATURES)
+    trained = F.relu(cells @ head.hidden.weight.T + head.hidden.bias) @ head.projection.weight.T
+    trained = trained + head.projection.bias
+    classes = torch.softmax(
+        (cells[:, :1280] @ head.mixture.classifier.weight.T + head.mixture.classifier.bias) / 2, 1
+    )
+    names = head.mixture.class_embeddings
+    mixture = classes @ (names - names.mean(0))
+    expected = 0.7 * trained / trained.norm(dim=1, keepdim=True)
+    expected = expected + 0.3 * mixture / mixture.norm(dim=1, keepdim=True)
+    expected = expected / expected.norm(dim=1, keepdim=True)
+    torch.testing.assert_close(head(cells, 2.0), expected)
+
+
+def test_cells_hold_what_their_names_say(encoder: EmbeddedEncoder, image: np.ndarray) -> None:
+    cells = encoder.encode_cells([image])
+    assert cells.shape == (1, 6, 10, NUM_CELL_FEATURES)
+    torch.testing.assert_close(cells[..., :1280], encoder.encode_trunk([image]))
+    flat = np.full((96, 160, 3), (255, 0, 51), np.uint8)
+    colors = encoder.encode_cells([flat])[0, ..., -48:]
+    torch.testing.assert_close(
+        colors, torch.tensor([1.0, -1.0, -0.6]).repeat_interleave(16).expand_as(colors)
+    )
 
 
 def test_map_is_of_unit_length_and_divides_the_image(
@@ -127,7 +173,7 @@ def test_cells_look_at_their_middle(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def agreement(alignment_px: int) -> float:
         monkeypatch.setattr(efficientnet, "_ALIGNMENT_PX", alignment_px)
-        logits = encoder.head.class_logits(encoder.encode_trunk([image, image[:, ::-1]]))
+        logits = encoder.head.mixture.class_logits(encoder.encode_trunk([image, image[:, ::-1]]))
         logits = logits - logits.mean(dim=(1, 2), keepdim=True)
         agreeing = F.cosine_similarity(logits[0], logits[1].flip(1), dim=2)
         return agreeing[3:-3, 3:-3].mean().item()
@@ -170,22 +216,30 @@ def test_missing_weights(tmp_path: Path) -> None:
     with pytest.raises(MissingWeightsError) as caught:
         EmbeddedEncoder(weights_dir=tmp_path)
     assert str(caught.value) == (
-        "The embedded encoder misses image.safetensors, text.safetensors, tokenizer.json, "
-        f"config.json in {tmp_path}; expected image.safetensors, text.safetensors, tokenizer.json, "
-        "config.json. Reinstall the package, or make them with "
-        "`python tools/convert_embedded_weights.py`."
+        "The embedded encoder misses image.safetensors, head.safetensors, text.safetensors, "
+        f"tokenizer.json, config.json in {tmp_path}; expected image.safetensors, head.safetensors, "
+        "text.safetensors, tokenizer.json, config.json. Reinstall the package, or make them with "
+        "`python -m tools.convert_embedded_weights` and "
+        "`python -m tools.train_embedded_encoder export`."
     )
 
 
-def test_weights_of_another_model(tmp_path: Path) -> None:
-    for file in WEIGHTS_DIR.iterdir():
-        shutil.copy(file, tmp_path)
-    shutil.copy(tmp_path / "text.safetensors", tmp_path / "image.safetensors")
+@pytest.mark.parametrize(
+    ("file", "module", "command"),
+    [
+        ("image.safetensors", "EfficientNet", "python -m tools.convert_embedded_weights"),
+        ("head.safetensors", "ModuleDict", "python -m tools.train_embedded_encoder export"),
+    ],
+)
+def test_weights_of_another_model(tmp_path: Path, file: str, module: str, command: str) -> None:
+    for source in WEIGHTS_DIR.iterdir():
+        shutil.copy(source, tmp_path)
+    shutil.copy(tmp_path / "text.safetensors", tmp_path / file)
     with pytest.raises(InvalidWeightsError) as caught:
         EmbeddedEncoder(weights_dir=tmp_path)
     assert str(caught.value) == (
-        f"{tmp_path / 'image.safetensors'} does not fit EfficientNet: expected the tensors that "
-        "`python tools/convert_embedded_weights.py` writes. Run it again."
+        f"{tmp_path / file} does not fit {module}: expected the tensors that `{command}` writes. "
+        "Run it again."
     )
 
 
@@ -215,6 +269,7 @@ def test_empty_text(encoder: EmbeddedEncoder) -> None:
     ("fields", "message"),
     [
         ({"long_side": 100}, "long_side is 100, expected a positive multiple of 32."),
+        ({"mixture_share": 1.5}, "mixture_share is 1.5, expected a number in 0..1 or None."),
         ({"temperature": 0.0}, "temperature is 0.0, expected a positive number."),
         (
             {"precision": "float16"},

@@ -131,11 +131,7 @@ def reference_pool(relation: str, names: Sequence[str]) -> list[str]:
         Names.
     """
     words = words_of(names)
-    return [
-        name
-        for name in names
-        if words[name].label is not None and _admits(relation, name)
-    ]
+    return [name for name in names if words[name].label is not None and _admits(relation, name)]
 
 
 def _admits(relation: str, name: str) -> bool:
