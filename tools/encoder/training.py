@@ -179,16 +179,16 @@ def step_losses(
         "objects": every object and cell finds its texts; "texts": every text finds its objects
         and cells among all others and the background; "mixture": distance from the mixture.
     """
-    groups = rng.choice(len(data.groups), config.num_objects, replace=False)
-    spots = rng.choice(len(data.background), config.num_background, replace=False)
+    groups = _choose(len(data.groups), config.num_objects, rng)
+    spots = _choose(len(data.background), config.num_background, rng)
     rows = np.concatenate([data.groups[groups].ravel(), data.background[spots]])
     rows = torch.from_numpy(rows)
     mixture = data.mixtures[rows].float()
     trained = F.normalize(model.project(data.cells[rows].float(), config.dropout), dim=-1)
     share = config.mixture_share
     features = F.normalize((1 - share) * trained + share * mixture, dim=-1)
-    num_cells = config.num_objects * CELLS_PER_OBJECT
-    pooled = features[:num_cells].view(config.num_objects, CELLS_PER_OBJECT, -1).mean(dim=1)
+    num_cells = len(groups) * CELLS_PER_OBJECT
+    pooled = features[:num_cells].view(len(groups), CELLS_PER_OBJECT, -1).mean(dim=1)
     everything = torch.cat([F.normalize(pooled, dim=-1), features])
 
     labels = _labels(data, groups, spots)
@@ -207,6 +207,10 @@ def step_losses(
         "texts": _multi_positive(logits, is_true.float(), of_text),
         "mixture": (1 - (trained * mixture).sum(dim=1)).mean(),
     }
+
+
+def _choose(available: int, wanted: int, rng: np.random.Generator) -> np.ndarray:
+    return rng.choice(available, min(available, wanted), replace=False)
 
 
 def _labels(data: TrainingSet, groups: np.ndarray, spots: np.ndarray) -> Tensor:
