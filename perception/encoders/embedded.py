@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, cast, get_args
+from typing import cast
 
 import numpy as np
 import torch
@@ -23,7 +23,13 @@ from timm.models import EfficientNet
 from tokenizers import Tokenizer
 from torch import Tensor, nn
 
-from perception.encoders.base import TextFeatures, checked_text, stacked_images
+from perception.encoders.base import (
+    Precision,
+    TextFeatures,
+    checked_text,
+    compute_dtype,
+    stacked_images,
+)
 from perception.encoders.efficientnet import (
     NUM_FINAL_FEATURES,
     TRUNK_NAME,
@@ -46,8 +52,6 @@ TEXT_DIM = 384
 NUM_CLASSES = 1000
 _TEXTS_PER_BATCH = 256
 MAX_TOKENS = 256  # the length that all-MiniLM-L6-v2 was trained for
-
-Precision = Literal["auto", "float32", "bfloat16"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,15 +87,11 @@ class EmbeddedEncoderConfig:
             raise InvalidConfigError(
                 f"mixture_share is {self.mixture_share}, expected a number in 0..1 or None."
             )
-        if self.precision not in get_args(Precision):
-            names = ", ".join(get_args(Precision))
-            raise InvalidConfigError(f"Unknown precision {self.precision!r}. Precisions: {names}.")
+        compute_dtype(self.precision)
 
     def dtype(self) -> torch.dtype:
         """Return the type in which the image tower computes on this machine."""
-        if self.precision == "auto":
-            return torch.bfloat16 if _has_native_bfloat16() else torch.float32
-        return torch.bfloat16 if self.precision == "bfloat16" else torch.float32
+        return compute_dtype(self.precision)
 
 
 class EmbeddedEncoder:
@@ -247,10 +247,6 @@ def build_open_clip_model(text_config_dir: Path) -> CustomTextCLIP:
         "output_tokens": True,
     }
     return CustomTextCLIP(TEXT_DIM, vision_cfg, text_cfg).eval()  # pyright: ignore[reportArgumentType]
-
-
-def _has_native_bfloat16() -> bool:
-    return bool(torch.cpu._is_amx_tile_supported() or torch.cpu._is_avx512_bf16_supported())
 
 
 def _require_files(weights_dir: Path) -> None:
