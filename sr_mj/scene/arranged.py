@@ -55,11 +55,8 @@ def arrange(config: SceneConfig) -> Layout:
     """
     arrangement = config.arranged
     assert arrangement is not None
-    catalogue = open_catalogue(config.catalogue)
-    assets = tuple(catalogue.load(item.object) for item in arrangement.objects)
-    composed = compose_scene(assets, config.cameras)
-    drops = tuple(_drop(item.drop) for item in arrangement.objects)
-    layout = Layout(assets=assets, composed=composed, qpos=np.zeros(0), drops=drops)
+    layout = _undropped(arrangement, config)
+    composed = layout.composed
     if not arrangement.is_settled:
         return replace(layout, qpos=_drop_and_recover(config, layout))
     stored = stored_qpos(arrangement, composed)
@@ -86,10 +83,8 @@ def reproduce(config: SceneConfig) -> tuple[Difference, ...]:
     """
     arrangement = config.arranged
     assert arrangement is not None and arrangement.is_settled
-    catalogue = open_catalogue(config.catalogue)
-    assets = tuple(catalogue.load(item.object) for item in arrangement.objects)
-    composed = compose_scene(assets, config.cameras)
-    layout = Layout(assets=assets, composed=composed, qpos=np.zeros(0), drops=())
+    layout = _undropped(arrangement, config)
+    composed = layout.composed
     stored, qpos = stored_qpos(arrangement, composed), drop_again(arrangement, composed)
     changed = _changed_objects(arrangement, layout)
     return _differences(arrangement, stored, qpos, composed, changed)
@@ -172,6 +167,18 @@ def record_layout(layout: Layout) -> tuple[ArrangedObject, ...]:
         for asset, body, drop in zip(
             layout.assets, layout.composed.bodies, layout.drops, strict=True
         )
+    )
+
+
+def _undropped(arrangement: Arrangement, config: SceneConfig) -> Layout:
+    """Load and compose the objects; where they lie is not known yet, `qpos` is empty."""
+    catalogue = open_catalogue(config.catalogue)
+    assets = tuple(catalogue.load(item.object) for item in arrangement.objects)
+    return Layout(
+        assets=assets,
+        composed=compose_scene(assets, config.cameras),
+        qpos=np.zeros(0),
+        drops=tuple(_drop(item.drop) for item in arrangement.objects),
     )
 
 

@@ -1,7 +1,6 @@
 """Which objects and goals an arrangement gets."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -54,25 +53,12 @@ _LEVEL_COS, _LEAST_COVER = 0.97, 0.5
 OPEN_CATEGORIES = ("container", "cup")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Cast:
-    """The objects of an arrangement.
-
-    Attributes:
-        objects: Names in the catalogue, in the order in which they drop.
-        goal: The instruction.
-    """
-
-    objects: tuple[str, ...]
-    goal: str
-
-
 def words_of(names: Sequence[str]) -> dict[str, ObjectWords]:
     """Return the words of catalogue objects by name."""
     return {name: object_words(name) for name in names}
 
 
-def cast_for(goal: str, split: str, num_objects: int, rng: np.random.Generator) -> Cast:
+def cast_for(goal: str, split: str, num_objects: int, rng: np.random.Generator) -> tuple[str, ...]:
     """Draw objects for a grasp goal: one to three that satisfy it, the rest that do not.
 
     Args:
@@ -82,7 +68,7 @@ def cast_for(goal: str, split: str, num_objects: int, rng: np.random.Generator) 
         rng: Source of randomness.
 
     Returns:
-        The objects, in random order.
+        Names in the catalogue, in random order.
     """
     names = object_names(split)
     fitting = find_targets(goal, words_of(names))
@@ -92,7 +78,7 @@ def cast_for(goal: str, split: str, num_objects: int, rng: np.random.Generator) 
         *rng.choice(fitting, num_targets, replace=False),
         *rng.choice(others, num_objects - num_targets, replace=False),
     ]
-    return Cast(objects=tuple(str(drawn[i]) for i in rng.permutation(num_objects)), goal=goal)
+    return tuple(str(drawn[i]) for i in rng.permutation(num_objects))
 
 
 def cast_at_random(split: str, num_objects: int, rng: np.random.Generator) -> tuple[str, ...]:

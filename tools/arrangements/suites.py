@@ -150,7 +150,7 @@ def _try_grasp(
 ) -> tuple[Arrangement, str] | None:
     if slot.suite == "grasp":
         goal_text = GRASP_GOALS[slot.split][slot.index]
-        objects = cast_for(goal_text, slot.split, slot.kind.num_objects, rng).objects
+        objects = cast_for(goal_text, slot.split, slot.kind.num_objects, rng)
     else:
         objects = cast_at_random(slot.split, slot.kind.num_objects, rng)
         goal_text = draw_goal(words_of(objects), objects, rng).text
