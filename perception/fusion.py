@@ -21,7 +21,7 @@ from perception.errors import EmptyCloudError, InvalidConfigError, InvalidViewEr
 from perception.table_plane import TablePrior, above_table
 from perception.tsdf import extract_tsdf
 from perception.views import CameraView
-from perception.voxels import voxel_means
+from perception.voxels import average_rows, voxel_rows
 
 FusionMethod = Literal["voxel_means", "tsdf"]
 TableRule = Literal["keep", "remove"]
@@ -142,19 +142,36 @@ def _mean_surface(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (N, 3) means over voxels, and (N, 6) mean colours and directions to the cameras."""
     parts = [back_project(view, config) for view in views]
-    points = np.concatenate([part[0] for part in parts])
-    attributes = np.concatenate([part[1] for part in parts])
-    if len(points) == 0:
+    pixels = np.concatenate([part[0] for part in parts], axis=1).T
+    if len(pixels) == 0:
         raise EmptyCloudError(_explain_empty(views, config))
-    points, attributes, counts = voxel_means(points, attributes, config.voxel_size_m)
+    rows, counts = voxel_rows(pixels, config.voxel_size_m)
+    colors = np.concatenate([part[1] for part in parts], axis=1).T
+    points, colors = average_rows(pixels, rows, counts), average_rows(colors, rows, counts)
+    ends = np.cumsum([part[0].shape[1] for part in parts])[:-1]
+    shares = [np.bincount(part, minlength=len(counts)) for part in np.split(rows, ends)]
     is_seen = counts >= config.min_observations
-    points, attributes = points[is_seen], attributes[is_seen]
-    if len(points) == 0:
+    if not is_seen.any():
         raise EmptyCloudError(
             f"None of {len(is_seen)} voxels holds {config.min_observations} pixels or more; lower "
             "min_observations or enlarge voxel_size_m."
         )
-    return points, attributes
+    points = points[is_seen]
+    towards_cameras = _mean_directions(points, views, [share[is_seen] for share in shares])
+    return points, np.concatenate([colors[is_seen], towards_cameras], axis=1)
+
+
+def _mean_directions(
+    points: np.ndarray, views: Sequence[CameraView], weights: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Return (N, 3) weighted sums of the unit directions from points to cameras."""
+    total = np.zeros_like(points)
+    for view, weight in zip(views, weights, strict=True):
+        direction = view.position.astype(np.float32) - points
+        total += (
+            direction * (weight / np.linalg.norm(direction, axis=1)).astype(np.float32)[:, None]
+        )
+    return total
 
 
 def _tsdf_surface(

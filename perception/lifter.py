@@ -8,7 +8,7 @@ from torch import Tensor
 
 from perception.cache import LruCache, hash_image, hash_view
 from perception.cloud import FeatureCloud, GeometryCloud
-from perception.encoders.base import Encoder, TextFeatures
+from perception.encoders.base import CellEncoder, Encoder, TextFeatures
 from perception.errors import EmptyCloudError, InvalidConfigError
 from perception.fusion import FusionConfig, fuse, ordered_views
 from perception.language import parse_instruction
@@ -169,7 +169,14 @@ class MultiViewLifter:
         """Return the geometry cloud, and the feature cloud with a similarity of zero."""
         geometry = fuse(views, self.config.fusion)
         points, colors, normals = self._feature_points(geometry)
-        lifted = lift_features(points, views, self._feature_maps(views), self.config.lifting)
+        encoder = self.encoder
+        lifted = lift_features(
+            points,
+            views,
+            self._feature_maps(views),
+            self.config.lifting,
+            encoder.describe_cells if isinstance(encoder, CellEncoder) else None,
+        )
         is_seen = lifted.confidence > 0
         if not is_seen.any():
             raise EmptyCloudError(
@@ -210,20 +217,27 @@ class MultiViewLifter:
         return points, colors, normals.astype(np.float32)
 
     def _feature_maps(self, views: Sequence[CameraView]) -> Sequence[Tensor] | Tensor:
-        """Return one (C, h, w) map a view, encoding only the images that are not remembered."""
+        """Return one map a view, encoding only the images that are not remembered.
+
+        Maps are (C, h, w) of features, or (M, h, w) of cells if the encoder is a `CellEncoder`.
+        """
         keys = [f"{self.encoder.fingerprint}|{hash_image(view.rgb)}" for view in views]
         maps = {key: m for key in keys if (m := self._maps.get(key)) is not None}
         missing = {k: v.rgb for k, v in zip(keys, views, strict=True) if k not in maps}
         for shape in sorted({rgb.shape for rgb in missing.values()}):
             group = {key: rgb for key, rgb in missing.items() if rgb.shape == shape}
-            encoded = self.encoder.encode_dense(list(group.values()))
-            encoded = encoded.to(self.config.lifting.dtype)
+            encoded = self._encode(list(group.values()))
             maps.update(zip(group, encoded, strict=True))
             if list(group) == keys:
                 self._remember(maps)
                 return encoded  # in one piece: lifting then copies nothing
         self._remember(maps)
         return [maps[key] for key in keys]
+
+    def _encode(self, images: Sequence[np.ndarray]) -> Tensor:
+        if isinstance(self.encoder, CellEncoder):
+            return self.encoder.encode_cells(images).permute(0, 3, 1, 2)
+        return self.encoder.encode_dense(images).to(self.config.lifting.dtype)
 
     def _remember(self, maps: dict[str, Tensor]) -> None:
         for key, feature_map in maps.items():

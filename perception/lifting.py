@@ -5,7 +5,7 @@ maps, 4 K rows a point, which `embedding_bag` computes without any copy of the m
 one tensor with channels innermost. docs/fusion.md has the measurements.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,6 +20,7 @@ from perception.views import CameraView
 
 WeightRule = Literal["margin", "ratio"]
 MapPrecision = Literal["float32", "bfloat16"]
+Describe = Callable[[Tensor], Tensor]
 
 # Points at a time: their features (1.5 MB at 768 channels) stay in a core's cache until normalised.
 _CHUNK = 512
@@ -35,7 +36,8 @@ class LiftingConfig:
             one that measured a surface nearer than the point by more than this does not count.
         weight_rule: Reading of eq. (1). "margin": exp(-max(0, |delta| - mu) / mu), full weight up
             to mu. "ratio": exp(-|delta| / mu).
-        precision: In what the maps are kept and summed. bfloat16 halves their memory and the time
+        precision: In what maps of features are kept and summed (cells keep the encoder's own type
+            until they are described). bfloat16 halves their memory and the time
             of the sum; features turn by less than half a degree.
     """
 
@@ -103,6 +105,7 @@ def lift_features(
     views: Sequence[CameraView],
     feature_maps: Sequence[Tensor] | Tensor,
     config: LiftingConfig,
+    describe: Describe | None = None,
 ) -> LiftedFeatures:
     """Lift feature maps to points.
 
@@ -113,6 +116,9 @@ def lift_features(
             of them as (K, C, h, w). One tensor of the configured precision with channels innermost
             in memory (`torch.channels_last`) is used as it is; anything else is copied once.
         config: Settings.
+        describe: Turns cells (M, C) of the maps, of any type, into features (M, D), for encoders
+            that describe cells one by one: then only the cells that points fall into are described.
+            None takes the cells as features.
 
     Returns:
         Features and confidence of every point.
@@ -133,20 +139,34 @@ def lift_features(
     total = weight.sum(axis=1)
     # A point without any weight keeps zeros instead of 0 / 0.
     weight /= np.where(total > 0, total, 1.0)[:, None]
+    table, row = _as_table(feature_maps), np.concatenate(rows, axis=1)
+    if describe is not None:
+        table, row = _describe_used(table, row, weight, describe)
     features = _sum_rows(
-        _as_table(feature_maps, config.dtype),
-        torch.from_numpy(np.concatenate(rows, axis=1)),
+        table.to(config.dtype),
+        torch.from_numpy(row),
         torch.from_numpy(weight).to(config.dtype),
     )
     confidence = total / len(views)
     return LiftedFeatures(features=features, confidence=confidence.astype(np.float32))
 
 
-def _as_table(feature_maps: Sequence[Tensor] | Tensor, dtype: torch.dtype) -> Tensor:
+def _as_table(feature_maps: Sequence[Tensor] | Tensor) -> Tensor:
     """Return the cells of all maps as rows, (cells, C)."""
     if isinstance(feature_maps, Tensor):
-        return feature_maps.permute(0, 2, 3, 1).flatten(0, 2).to(dtype)
-    return torch.cat([m.permute(1, 2, 0).flatten(0, 1).to(dtype) for m in feature_maps])
+        return feature_maps.permute(0, 2, 3, 1).flatten(0, 2)
+    return torch.cat([m.permute(1, 2, 0).flatten(0, 1) for m in feature_maps])
+
+
+def _describe_used(
+    table: Tensor, rows: np.ndarray, weight: np.ndarray, describe: Describe
+) -> tuple[Tensor, np.ndarray]:
+    """Return the features of the rows that have weight, and where `rows` are among them."""
+    is_used = np.zeros(len(table), bool)
+    is_used[rows[weight > 0]] = True
+    is_used[0] = True  # where no row has weight, the sums still need one
+    position = np.cumsum(is_used) - 1  # that of a row without weight does not matter
+    return describe(table[torch.from_numpy(is_used)]), position[rows]
 
 
 def _sum_rows(table: Tensor, rows: Tensor, weights: Tensor) -> np.ndarray:

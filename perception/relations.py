@@ -12,7 +12,8 @@ _SYNONYMS = {
     "in": ("into", "inside of", "inside", "within", "in to"),
     "to": ("over to", "towards", "toward"),
     "surrounding to": ("surrounding",),
-    "close to": ("close by", "not far from", "closely to", "closer to"),
+    "close to": ("close by", "not far from", "not too far from", "closely to", "closer to",
+                 "in close proximity to", "in proximity to"),
     "next to": (
         "adjacent to", "by the side of", "at the side of", "on the side of", "to the side of",
         "to the left of", "to the right of", "on the left of", "on the right of", "left of",
@@ -20,7 +21,8 @@ _SYNONYMS = {
     ),
     "beside": ("besides", "alongside", "along side"),
     "around": ("round", "somewhere around"),
-    "near": ("nearby to", "nearby", "near to", "nearer to", "in the vicinity of", "by", "at"),
+    "near": ("nearby to", "nearby", "near to", "nearer to", "in the vicinity of",
+             "in the neighbourhood of", "in the neighborhood of", "by", "at"),
 }  # fmt: skip
 _CANONICAL = {phrase: name for name, phrases in _SYNONYMS.items() for phrase in phrases}
 _CANONICAL |= {name: name for name in RELATIONS}

@@ -55,11 +55,7 @@ def voxel_rows(
     """
     if len(points) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    cells = np.floor(points * np.float32(1.0 / voxel_size_m) + np.float32(0.5)).astype(np.int64)
-    cells -= cells.min(axis=0)
-    size = cells.max(axis=0) + 1
-    keys = (cells[:, 0] * size[1] + cells[:, 1]) * size[2] + cells[:, 2]
-    num_cells = int(np.prod(size))
+    keys, num_cells = _cell_keys(points, voxel_size_m)
     if num_cells > _MOST_TABLED_CELLS:
         _, rows, counts = np.unique(keys, return_inverse=True, return_counts=True)
         return rows, counts
@@ -67,10 +63,27 @@ def voxel_rows(
     is_occupied = np.zeros(num_cells, bool)
     is_occupied[keys] = True
     occupied = np.flatnonzero(is_occupied)
-    numbers = np.empty(num_cells, np.int32)
-    numbers[occupied] = np.arange(len(occupied), dtype=np.int32)
-    rows = numbers[keys].astype(np.int64)
+    numbers = np.empty(num_cells, np.int64)
+    numbers[occupied] = np.arange(len(occupied))
+    rows = numbers[keys]
     return rows, np.bincount(rows)
+
+
+def _cell_keys(points: np.ndarray, voxel_size_m: float) -> tuple[np.ndarray, int]:
+    """Return (N,) int64 lexicographic positions of the points' cells, and the size of the grid."""
+    keys, num_cells = np.zeros(len(points), np.int64), 1
+    # Axis by axis: a third of the memory, and fast for points that are stored by axis.
+    for axis in points.T:
+        cells = axis * np.float32(1.0 / voxel_size_m)
+        cells += np.float32(0.5)
+        cells = np.floor(cells, out=cells).astype(np.int64)
+        low = cells.min()
+        size = int(cells.max() - low) + 1
+        keys *= size
+        keys += cells
+        keys -= low
+        num_cells *= size
+    return keys, num_cells
 
 
 def average_rows(

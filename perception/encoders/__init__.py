@@ -1,4 +1,4 @@
-"""Encoders by name: the embedded default, and CLIP vision transformers through open_clip."""
+"""Encoders by name: the embedded default, and models of open_clip."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +16,7 @@ DEFAULT_TAGS = {
     "ViT-B-16": "openai",
     "ViT-B-32": "openai",
     "ViT-H-14": "laion2b_s32b_b79k",
+    "ViT-B-16-SigLIP": "webli",
 }
 
 
@@ -43,8 +44,9 @@ def load_encoder(name: str = "embedded", *, allow_download: bool = False) -> "En
     """Load an encoder by name.
 
     Args:
-        name: One of `available_encoders()`. A CLIP model may carry the tag of its weights or a file
-            that holds them: "ViT-B-16:laion2b_s34b_b88k", "ViT-L-14:/data/ViT-L-14.pt".
+        name: One of `available_encoders()`, or any other model of open_clip with a tag of its
+            weights or a file that holds them: "ViT-B-16:laion2b_s34b_b88k",
+            "convnext_base:/data/convnext.safetensors".
         allow_download: Whether weights that are not on this machine may be fetched. Off by default:
             nothing reaches a network unless it is asked to.
 
@@ -53,6 +55,7 @@ def load_encoder(name: str = "embedded", *, allow_download: bool = False) -> "En
 
     Raises:
         UnknownEncoderError: If there is no encoder, or no tag, of that name.
+        UnsupportedEncoderError: If the model of open_clip cannot be read patch by patch.
         MissingWeightsError: If the weights are not on this machine.
         InvalidWeightsError: If a weight file does not fit the architecture.
     """
@@ -98,9 +101,13 @@ def encoder_weights_status() -> tuple[WeightsStatus, ...]:
 def _check_name(name: str, architecture: str, source: str) -> None:
     known = available_encoders()
     if architecture not in known:
+        from open_clip import list_models
+
+        if source and architecture in list_models():
+            return
         raise UnknownEncoderError(
-            f"Unknown encoder {name!r}. Encoders: {', '.join(known)}; a CLIP model may be followed "
-            f"by :TAG or :/path/to/file.{did_you_mean(architecture, known)}"
+            f"Unknown encoder {name!r}. Encoders: {', '.join(known)}, and any model of open_clip "
+            f"followed by :TAG or :/path/to/file.{did_you_mean(architecture, known)}"
         )
     if architecture == "embedded" and source:
         raise UnknownEncoderError(

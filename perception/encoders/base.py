@@ -87,6 +87,37 @@ class Encoder(Protocol):
         ...
 
 
+@runtime_checkable
+class CellEncoder(Encoder, Protocol):
+    """An encoder that turns each cell of its maps into text space on its own.
+
+    `encode_dense` is `describe_cells` of all cells of `encode_cells`. A scene's points fall into a
+    part of the cells only; `perception.lifting` describes no others.
+    """
+
+    def encode_cells(self, images: Sequence[np.ndarray]) -> torch.Tensor:
+        """Encode images into cells, which are not yet in text space.
+
+        Args:
+            images: V images, each (H, W, 3) uint8 RGB, all of one size.
+
+        Returns:
+            (V, h, w, M) in any floating type, the same h and w as of `encode_dense`.
+        """
+        ...
+
+    def describe_cells(self, cells: torch.Tensor) -> torch.Tensor:
+        """Turn cells into features in text space.
+
+        Args:
+            cells: (..., M) of `encode_cells`.
+
+        Returns:
+            (..., C) float32, unit length.
+        """
+        ...
+
+
 def stacked_images(images: Sequence[np.ndarray]) -> np.ndarray:
     """Check images of one size and stack them.
 

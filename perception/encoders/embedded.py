@@ -35,6 +35,7 @@ from perception.encoders.efficientnet import (
     TRUNK_NAME,
     cell_features,
     fold_batch_norm,
+    pad_within_convolutions,
     to_network_input,
 )
 from perception.encoders.head import GroundingHead
@@ -43,6 +44,8 @@ from perception.errors import InvalidConfigError, InvalidWeightsError, MissingWe
 WEIGHTS_DIR = Path(__file__).resolve().parents[1] / "weights" / "embedded"
 IMAGE_WEIGHTS = "image.safetensors"
 HEAD_WEIGHTS = "head.safetensors"
+TUNED = "tower."
+"""Prefix, in the head's file, of the weights of the image tower that were trained with it."""
 TEXT_WEIGHTS = "text.safetensors"
 TOKENIZER = "tokenizer.json"
 TEXT_CONFIG = "config.json"
@@ -62,7 +65,8 @@ class EmbeddedEncoderConfig:
         long_side: Length in pixels to which an image's longer side is resized, a multiple of 32.
         temperature: Softening of the class probabilities.
         mixture_share: Weight of the class-name mixture beside the trained projection, in 0..1; 1 is
-            the mixture alone, without any training. None takes the weight stored with the head.
+            the mixture alone, on the tower as it was before any training. None takes the weight
+            stored with the head.
         precision: Arithmetic of the image tower. `auto` takes bfloat16 where the CPU multiplies it
             natively (AMX, AVX512-BF16) and float32 elsewhere; features then differ slightly
             between machines.
@@ -124,15 +128,23 @@ class EmbeddedEncoder:
         self._tokenizer.enable_truncation(MAX_TOKENS)
         model = build_open_clip_model(weights_dir)
         self.head = GroundingHead(num_classes=NUM_CLASSES, text_dim=TEXT_DIM)
-        _load_weights(model, self.head, weights_dir)
+        tuned = _load_weights(model, self.head, weights_dir)
         model.requires_grad_(False)
         self.head.requires_grad_(False)
         if self.config.mixture_share is not None:
             self.head.mixture_share.fill_(self.config.mixture_share)
         self._text_tower = cast(HFTextEncoder, model.text)
-        trunk = fold_batch_norm(cast(EfficientNet, model.get_submodule("visual.trunk")))
+        trunk = cast(EfficientNet, model.get_submodule("visual.trunk"))
+        trunk = pad_within_convolutions(fold_batch_norm(trunk))
+        if self.config.mixture_share != 1:
+            _tune(trunk, tuned, weights_dir)
         self._trunk = trunk.to(self._dtype).to(memory_format=torch.channels_last)
         self.fingerprint = _fingerprint(weights_dir, self.config, self._dtype)
+
+    @property
+    def trunk(self) -> EfficientNet:
+        """The image tower up to the classifier, batch norm folded, in the tower's type."""
+        return self._trunk
 
     def network_size(self, height: int, width: int) -> tuple[int, int]:
         """Return the size to which an image is resized: aspect ratio kept to the next 32 pixels.
@@ -170,8 +182,7 @@ class EmbeddedEncoder:
             (V, h, w, NUM_CELL_FEATURES); see `perception.encoders.efficientnet.cell_features`.
         """
         batch = torch.from_numpy(stacked_images(images)).permute(0, 3, 1, 2)
-        pixels = to_network_input(batch, self.network_size(*batch.shape[-2:]))
-        pixels = pixels.to(dtype=self._dtype, memory_format=torch.channels_last)
+        pixels = to_network_input(batch, self.network_size(*batch.shape[-2:]), self._dtype)
         return cell_features(self._trunk, pixels)
 
     @torch.no_grad()
@@ -184,8 +195,19 @@ class EmbeddedEncoder:
         Returns:
             (V, 384, h, w) float32, each cell of unit length; a view with channels innermost.
         """
-        features = self.head(self.encode_cells(images), self.config.temperature)
-        return features.permute(0, 3, 1, 2)
+        return self.describe_cells(self.encode_cells(images)).permute(0, 3, 1, 2)
+
+    @torch.no_grad()
+    def describe_cells(self, cells: Tensor) -> Tensor:
+        """Turn cells into features in text space; see `CellEncoder.describe_cells`.
+
+        Args:
+            cells: (..., NUM_CELL_FEATURES) of `encode_cells`.
+
+        Returns:
+            (..., 384) float32, unit length.
+        """
+        return self.head(cells, self.config.temperature)
 
     @torch.no_grad()
     def encode_text(self, text: str) -> TextFeatures:
@@ -260,7 +282,10 @@ def _require_files(weights_dir: Path) -> None:
         )
 
 
-def _load_weights(model: CustomTextCLIP, head: GroundingHead, weights_dir: Path) -> None:
+def _load_weights(
+    model: CustomTextCLIP, head: GroundingHead, weights_dir: Path
+) -> dict[str, Tensor]:
+    """Load towers and head; return the weights of the image tower that were trained."""
     convert = "python -m tools.convert_embedded_weights"
     export = "python -m tools.train_embedded_encoder export"
     trained = nn.ModuleDict({"hidden": head.hidden, "projection": head.projection})
@@ -282,6 +307,16 @@ def _load_weights(model: CustomTextCLIP, head: GroundingHead, weights_dir: Path)
     if share is None:
         raise _wrong_weights(weights_dir / HEAD_WEIGHTS, type(head).__name__, export)
     head.mixture_share = share
+    return {k.removeprefix(TUNED): v for k, v in files[HEAD_WEIGHTS].items() if k.startswith(TUNED)}
+
+
+def _tune(trunk: EfficientNet, tuned: dict[str, Tensor], weights_dir: Path) -> None:
+    """Replace weights of the folded tower, in place, by those that were trained with the head."""
+    state = trunk.state_dict()
+    if any(name not in state or state[name].shape != w.shape for name, w in tuned.items()):
+        export = "python -m tools.train_embedded_encoder export"
+        raise _wrong_weights(weights_dir / HEAD_WEIGHTS, type(trunk).__name__, export)
+    trunk.load_state_dict(tuned, strict=False)
 
 
 def _load_floats(file: Path) -> dict[str, Tensor]:

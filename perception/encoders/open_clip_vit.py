@@ -1,12 +1,7 @@
-"""CLIP vision transformers as dense encoders (section 3.2.1: multi-scale patch features).
-
-CLIP is trained to describe whole images. What its patches show is kept best by the value path of
-the last attention block (MaskCLIP, Zhou et al. 2022): value and output projection without the
-mixing over patches, then the final layer norm and the projection into text space.
-"""
+"""Models of open_clip as dense encoders (section 3.2.1: multi-scale patch features)."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -14,9 +9,9 @@ import numpy as np
 import open_clip
 import torch
 import torch.nn.functional as F
+from huggingface_hub.constants import HF_HUB_CACHE
 from open_clip.factory import load_state_dict
-from open_clip.model import CLIP, resize_pos_embed
-from open_clip.transformer import ResidualAttentionBlock, VisionTransformer
+from open_clip.model import CLIP, CustomTextCLIP, resize_pos_embed
 from safetensors import SafetensorError
 from torch import Tensor, nn
 
@@ -28,8 +23,10 @@ from perception.encoders.base import (
     stacked_images,
 )
 from perception.encoders.clip_weights import RGB, ClipWeights, is_torchscript
+from perception.encoders.image_towers import image_tower
+from perception.encoders.text_towers import text_tower
 from perception.encoders.tiling import Window, blend, image_windows
-from perception.errors import InvalidConfigError, InvalidWeightsError
+from perception.errors import InvalidConfigError, InvalidWeightsError, MissingWeightsError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,11 +59,11 @@ class VitConfig:
 
 
 class OpenClipVitEncoder:
-    """A CLIP model of open_clip, with a vision transformer, behind the `Encoder` protocol."""
+    """A model of open_clip behind the `Encoder` protocol."""
 
     def __init__(
         self,
-        model: CLIP,
+        model: CLIP | CustomTextCLIP,
         *,
         architecture: str,
         source: str,
@@ -77,25 +74,28 @@ class OpenClipVitEncoder:
         """Wrap a loaded model.
 
         Args:
-            model: An `open_clip.CLIP` whose image tower is a plain vision transformer.
+            model: An `open_clip.CLIP` or `CustomTextCLIP`.
             architecture: Name of its configuration in open_clip; chooses the tokenizer.
             source: Where its weights come from.
             mean: RGB mean for normalisation.
             std: RGB deviation for normalisation.
             config: Settings; the defaults if None.
+
+        Raises:
+            UnsupportedEncoderError: If one of the towers cannot be read token by token.
+            MissingWeightsError: If the tokenizer is not on this machine.
         """
         self.config = config or VitConfig()
         self.name = f"{architecture}:{source}"
         self._model = model.eval().requires_grad_(False)
         self._dtype = compute_dtype(self.config.precision)
         self.fingerprint = _fingerprint(self.name, model, self.config, self._dtype)
-        self._visual = cast(VisionTransformer, model.visual.to(self._dtype))
-        self._blocks = cast(list[ResidualAttentionBlock], list(self._visual.transformer.resblocks))
-        self._projection = cast(Tensor, self._visual.proj)
-        self._tokenizer = open_clip.get_tokenizer(architecture)
+        self._tower = image_tower(cast(nn.Module, model.visual).to(self._dtype), self.name)
+        self._text_tower = text_tower(model, self.name)
+        self._tokenizer = _load_tokenizer(architecture)
         self._mean = torch.tensor(mean).view(3, 1, 1) * 255.0
         self._std = torch.tensor(std).view(3, 1, 1) * 255.0
-        self.feature_dim = int(self._visual.output_dim)
+        self.feature_dim = self._text_tower.feature_dim
 
     @classmethod
     def from_weights(
@@ -115,7 +115,7 @@ class OpenClipVitEncoder:
         """
         # open_clip only warns where configuration and weights disagree about GELU.
         model = cast(
-            CLIP,
+            CLIP | CustomTextCLIP,
             open_clip.create_model(
                 weights.architecture,
                 load_weights=False,
@@ -164,10 +164,11 @@ class OpenClipVitEncoder:
 
     @torch.no_grad()
     def encode_text(self, text: str) -> TextFeatures:
-        """Encode one text with CLIP's text tower; see `Encoder.encode_text`.
+        """Encode one text with the model's text tower; see `Encoder.encode_text`.
 
         Args:
-            text: Any text with at least one word; beyond 77 tokens it is cut.
+            text: Any text with at least one word; beyond the tower's context (77 tokens in CLIP)
+                it is cut.
 
         Returns:
             Its features; tokens reach from the start token to the end token, and are projected into
@@ -176,20 +177,10 @@ class OpenClipVitEncoder:
         Raises:
             InvalidTextError: If the text is empty.
         """
-        ids = self._tokenizer([checked_text(text)])
-        end = int(ids[0].argmax())  # the end token has the highest number of all
-        model = self._model
-        x = model.get_submodule("token_embedding")(ids) + model.positional_embedding
-        x = model.get_submodule("transformer")(x, attn_mask=model.attn_mask)
-        x = model.get_submodule("ln_final")(x)
-        projected = (x @ cast(Tensor, model.text_projection))[0]
-        return TextFeatures(
-            pooled=F.normalize(projected[end], dim=0).numpy(),
-            tokens=projected[: end + 1].numpy(),
-        )
+        return self._text_tower.read(self._tokenizer([checked_text(text)]))
 
     def value_features(self, pixels: Tensor, grid: tuple[int, int]) -> Tensor:
-        """Compute patch features in text space by the value path of the last block.
+        """Compute patch features in text space; see `perception.encoders.image_towers`.
 
         Args:
             pixels: (B, 3, h * patch, w * patch) normalised pixels.
@@ -198,43 +189,21 @@ class OpenClipVitEncoder:
         Returns:
             (B, h, w, C) float32, each cell of unit length.
         """
-        visual = self._visual
-        x = visual.conv1(pixels.to(self._dtype)).flatten(2).transpose(1, 2)
-        token = visual.class_embedding.expand(len(x), 1, -1)
-        x = torch.cat([token, x], dim=1) + self._position_embedding(grid)
-        *blocks, last = self._blocks
-        x = visual.get_submodule("ln_pre")(x)
-        for block in blocks:
-            x = block(x)
-        x = last.ln_1(x[:, 1:])
-        # MultiheadAttention stacks the input projections of queries, keys and values.
-        weight, bias = last.attn.in_proj_weight.chunk(3)[2], last.attn.in_proj_bias.chunk(3)[2]
-        values = last.attn.out_proj(F.linear(x, weight, bias))
-        features = (visual.ln_post(values) @ self._projection).float()
+        features = self._tower.read(pixels.to(self._dtype), grid).float()
         return F.normalize(features, dim=-1).unflatten(1, grid)
 
     def _patch_grid(self, height: int, width: int) -> tuple[int, int]:
         """Return the patches of one pass: the trained number on the short side, aspect kept."""
-        short = min(self._visual.grid_size)
+        short = min(self._tower.grid_size)
         scale = short / min(height, width)
         return max(1, round(height * scale)), max(1, round(width * scale))
-
-    def _position_embedding(self, grid: tuple[int, int]) -> Tensor:
-        embedding = self._visual.positional_embedding
-        if grid == tuple(self._visual.grid_size):
-            return embedding
-        patches = embedding[1:].float().T.reshape(1, -1, *self._visual.grid_size)
-        resized = F.interpolate(
-            patches, size=grid, mode="bicubic", antialias=True, align_corners=False
-        )
-        return torch.cat([embedding[:1], resized.flatten(2)[0].T.to(embedding.dtype)])
 
     def _network_input(self, pixels: Tensor, window: Window, grid: tuple[int, int]) -> Tensor:
         height, width = pixels.shape[-2:]
         top, left = round(window.top * height), round(window.left * width)
         bottom = round((window.top + window.size) * height)
         right = round((window.left + window.size) * width)
-        patch_height, patch_width = self._visual.patch_size
+        patch_height, patch_width = self._tower.patch_size
         return F.interpolate(
             pixels[..., top:bottom, left:right],
             size=(grid[0] * patch_height, grid[1] * patch_width),
@@ -256,11 +225,30 @@ def _read_state(weights: ClipWeights, model: nn.Module) -> dict[str, Tensor]:
     return {name: tensor.float() for name, tensor in state.items()}
 
 
-def _fingerprint(name: str, model: CLIP, config: VitConfig, dtype: torch.dtype) -> str:
+def _load_tokenizer(architecture: str) -> Callable[[list[str]], Tensor]:
+    # Tokenizers of the hub belong to the weights: nothing is fetched behind the user's back.
+    repository = (open_clip.get_model_config(architecture) or {})["text_cfg"].get(
+        "hf_tokenizer_name"
+    )
+    try:
+        if repository is None:
+            return open_clip.get_tokenizer(architecture)
+        return open_clip.get_tokenizer(architecture, local_files_only=True)
+    except (OSError, ValueError) as error:
+        raise MissingWeightsError(
+            f"The tokenizer of {architecture} is not on this machine: no {repository} in "
+            f"{HF_HUB_CACHE}. Fetch it with `hf download {repository} --include '*token*' "
+            "'*.json'`."
+        ) from error
+
+
+def _fingerprint(
+    name: str, model: CLIP | CustomTextCLIP, config: VitConfig, dtype: torch.dtype
+) -> str:
     tiling = (config.num_tiles, config.tile_overlap)
     digest = hashlib.sha256(f"{name}|{tiling}|{dtype}".encode())
     # The first and last weights stand for all: hashing a gigabyte would take seconds.
-    visual = cast(VisionTransformer, model.visual)
-    for tensor in (visual.conv1.weight, cast(Tensor, visual.proj)):
+    weights = list(cast(nn.Module, model.visual).parameters())
+    for tensor in (weights[0], weights[-1]):
         digest.update(tensor.detach().float().numpy().tobytes())
     return f"{name}-{digest.hexdigest()[:16]}"

@@ -11,6 +11,16 @@ import numpy as np
 from perception.errors import InvalidFileError, InvalidViewError, MissingFileError, did_you_mean
 from perception.views import Intrinsics
 
+# What calibration tools call the coefficients of a lens.
+_DISTORTION_NAMES = (
+    "distortion",
+    "distortion_coefficients",
+    "dist_coeffs",
+    "dist",
+    "D",
+    "k1",
+    "k2",
+)
 _RIGID_TOLERANCE = 1e-3  # files are written with few digits; the rotation is made exact below
 
 
@@ -105,6 +115,30 @@ def as_positive(where: str, name: str, value: Any) -> float:
     if not (is_number and math.isfinite(value) and value > 0):
         raise InvalidFileError(f"{where}: {name} is {shortened(value)}; expected a number above 0.")
     return float(value)
+
+
+def refuse_distortion(where: str, data: Any) -> None:
+    """Refuse a camera whose images are not those of a pinhole.
+
+    Args:
+        where: File and object.
+        data: The object that may hold coefficients of lens distortion.
+
+    Raises:
+        InvalidFileError: If one of them is not 0.
+    """
+    for name in _DISTORTION_NAMES:
+        value = data.get(name) if isinstance(data, dict) else None
+        try:
+            is_zero = value is None or not np.asarray(value, dtype=np.float64).any()
+        except (TypeError, ValueError):
+            is_zero = False
+        if not is_zero:
+            raise InvalidFileError(
+                f"{where}: {name} is {shortened(value)}; lens distortion is not undone here. "
+                "Undistort colour and depth first, give the new intrinsics, and leave the "
+                "coefficients out."
+            )
 
 
 def make_intrinsics(

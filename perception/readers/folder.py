@@ -30,6 +30,7 @@ from perception.readers.fields import (
     get_field,
     inverse_rigid,
     read_json,
+    refuse_distortion,
     shortened,
 )
 from perception.readers.frames import Frame, ReadOptions, list_images
@@ -132,8 +133,9 @@ def read_intrinsics(where: str, data: Any) -> tuple[float, float, float, float]:
         The four numbers, pixels.
 
     Raises:
-        InvalidFileError: If one is missing or not a positive number.
+        InvalidFileError: If one is missing or not a positive number, or lens distortion is given.
     """
+    refuse_distortion(where, data)
     fx, fy, cx, cy = (
         as_positive(where, name, get_field(where, data, name)) for name in _INTRINSIC_NAMES
     )
@@ -149,6 +151,7 @@ def _make_frame(
     options: ReadOptions,
 ) -> Frame:
     where = f"{path}: cameras.{name}"
+    refuse_distortion(where, camera)
     intrinsics = options.intrinsics or read_intrinsics(
         f"{where}.intrinsics", get_field(where, camera, "intrinsics")
     )

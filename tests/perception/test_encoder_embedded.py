@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import torch
 import torch.nn.functional as F
+from timm.layers import Conv2dSame
 
 from perception.encoders import efficientnet
-from perception.encoders.base import Encoder
+from perception.encoders.base import CellEncoder, Encoder
 from perception.encoders.efficientnet import NUM_CELL_FEATURES
 from perception.encoders.embedded import (
     WEIGHTS_DIR,
@@ -164,6 +165,34 @@ def _discs(height: int, width: int) -> np.ndarray:
         x, y, radius = rng.uniform((0, 0, 15), (width, height, 50))
         image[(u - x) ** 2 + (v - y) ** 2 < radius**2] = rng.integers(0, 256, 3)
     return image
+
+
+def test_padding_within_convolutions_changes_nothing() -> None:
+    torch.manual_seed(0)
+    trunk = efficientnet.perception_efficientnet_lite0().eval().double()
+    pixels = torch.randn(1, 3, 64, 96, dtype=torch.float64)
+    with torch.no_grad():
+        wanted = trunk.forward_features(pixels)
+        found = efficientnet.pad_within_convolutions(trunk).forward_features(pixels)
+    torch.testing.assert_close(found, wanted, atol=1e-10, rtol=1e-10)
+    assert not any(isinstance(module, Conv2dSame) for module in trunk.modules())
+
+
+def test_dense_features_are_the_described_cells(
+    encoder: EmbeddedEncoder, image: np.ndarray
+) -> None:
+    assert isinstance(encoder, CellEncoder)
+    described = encoder.describe_cells(encoder.encode_cells([image]))
+    torch.testing.assert_close(encoder.encode_dense([image]), described.permute(0, 3, 1, 2))
+
+
+def test_whole_steps_of_brightness_suffice_for_bfloat16() -> None:
+    rng = np.random.default_rng(0)
+    image = torch.from_numpy(rng.integers(0, 256, (1, 3, 72, 128), dtype=np.uint8))
+    exact = efficientnet.to_network_input(image, (64, 96))
+    rough = efficientnet.to_network_input(image, (64, 96), torch.bfloat16)
+    assert rough.dtype == torch.bfloat16
+    assert (rough.float() - exact).abs().max() < 1.6 / 127.5
 
 
 def test_cells_look_at_their_middle(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,8 @@ from perception.encoders import (
 from perception.encoders import clip_weights as weights_module
 from perception.errors import MissingWeightsError, UnknownEncoderError
 
-NAMES = "embedded, ViT-L-14, ViT-L-14-336, ViT-B-16, ViT-B-32, ViT-H-14"
+NAMES = "embedded, ViT-L-14, ViT-L-14-336, ViT-B-16, ViT-B-32, ViT-H-14, ViT-B-16-SigLIP"
+REST = "and any model of open_clip followed by :TAG or :/path/to/file."
 
 
 @pytest.fixture
@@ -36,18 +37,20 @@ def test_names() -> None:
     [
         (
             "ViT-L-41",
-            f"Unknown encoder 'ViT-L-41'. Encoders: {NAMES}; a CLIP model may be followed by :TAG "
-            "or :/path/to/file. Did you mean 'ViT-L-14'?",
+            f"Unknown encoder 'ViT-L-41'. Encoders: {NAMES}, {REST} Did you mean 'ViT-L-14'?",
         ),
         (
             "vit-b-16",
-            f"Unknown encoder 'vit-b-16'. Encoders: {NAMES}; a CLIP model may be followed by :TAG "
-            "or :/path/to/file. Did you mean 'ViT-B-16'?",
+            f"Unknown encoder 'vit-b-16'. Encoders: {NAMES}, {REST} Did you mean 'ViT-B-16'?",
         ),
         (
             "nonsense",
-            f"Unknown encoder 'nonsense'. Encoders: {NAMES}; a CLIP model may be followed by :TAG "
-            "or :/path/to/file.",
+            f"Unknown encoder 'nonsense'. Encoders: {NAMES}, {REST}",
+        ),
+        ("RN50", f"Unknown encoder 'RN50'. Encoders: {NAMES}, {REST}"),
+        (
+            "convnext_base:webli",
+            "Unknown weights 'webli' of convnext_base. Tags: laion400m_s13b_b51k.",
         ),
         (
             "embedded:large",

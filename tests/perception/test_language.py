@@ -29,14 +29,15 @@ from perception.relations import INSIDE_RELATIONS, PHRASES, RELATIONS, canonical
         ("where is the power drill", "power drill"),
         ("I'd like the salt and pepper shaker", "salt and pepper shaker"),
         ("bring me something to eat, thanks!", "something to eat"),
-        ("get something that is red", "something that is red"),
-        ("give me the can on the table", "can on the table"),  # says which, not where to
+        ("get something that is red", "red object"),
+        ("give me the can on the table", "can"),  # everything is
         ("the apple, please", "apple"),
         ("pear", "pear"),
         ("place mat", "place mat"),
         ("the chess set on the box", "chess set on the box"),
+        ("I am hungry.", "something to eat"),
         # Anything else falls back to the whole sentence.
-        ("I am hungry.", "i am hungry"),
+        ("the weather is nice", "weather is nice"),
         ("put it", "put it"),
     ],
 )

@@ -138,8 +138,8 @@ def test_help_is_quick_and_complete() -> None:
          "check the scale."),
         ("{f} --encoder embeded --out {t}/o",
          "Unknown encoder 'embeded'. Encoders: embedded, ViT-L-14, ViT-L-14-336, ViT-B-16, "
-         "ViT-B-32, ViT-H-14; a CLIP model may be followed by :TAG or :/path/to/file. Did you mean "
-         "'embedded'?"),
+         "ViT-B-32, ViT-H-14, ViT-B-16-SigLIP, and any model of open_clip followed by :TAG or "
+         ":/path/to/file. Did you mean 'embedded'?"),
         ("{f} --voxel-size 0 --out {t}/o", "voxel_size_m is 0.0, expected more than 0 m."),
         ("{f} --workspace 0 0 0 1 -1 1 --out {t}/o",
          "workspace_min (0.0, 0.0, 0.0) is not below workspace_max (1.0, -1.0, 1.0) on every axis; "

@@ -62,7 +62,7 @@ def scene(table_views: tuple[CameraView, ...]) -> LiftedScene:
 def test_phrases_find_their_objects(scene: LiftedScene) -> None:
     for word, center in CENTERS.items():
         answer = scene.query(f"{word} thing")
-        assert answer.phrase == f"{word} thing"
+        assert answer.phrase == f"{word} object"
         assert answer.score == answer.cloud.similarity.max()
         np.testing.assert_array_equal(answer.point, answer.cloud.points[answer.best])
         assert np.linalg.norm(answer.point[:2] - center) < 0.07

@@ -7,10 +7,11 @@ import torch
 import torch.nn.functional as F
 
 from perception.encoders.base import TextFeatures
+from perception.encoders.embedded import EmbeddedEncoder, EmbeddedEncoderConfig
 from perception.errors import EmptyCloudError, InvalidConfigError, InvalidTextError
 from perception.fusion import FusionConfig
 from perception.lifter import LifterConfig, MultiViewLifter
-from perception.lifting import LiftingConfig
+from perception.lifting import LiftingConfig, lift_features
 from perception.similarity import relevancy
 from perception.text_scores import TextScorer
 from perception.views import CameraView
@@ -88,6 +89,57 @@ def test_second_question_costs_only_its_text(
     assert encoder.texts == ["blue object", "give me the blue object"]
     assert second.geometry is first.geometry
     assert np.shares_memory(second.features.features, first.features.features)
+
+
+class CountingEncoder(EmbeddedEncoder):
+    """The embedded encoder at a small size, with every call of a tower counted."""
+
+    def __init__(self) -> None:
+        super().__init__(EmbeddedEncoderConfig(long_side=160))
+        self.num_images = self.num_described = 0
+        self.texts: list[str] = []
+
+    def encode_cells(self, images: Sequence[np.ndarray]) -> torch.Tensor:
+        self.num_images += len(images)
+        return super().encode_cells(images)
+
+    def describe_cells(self, cells: torch.Tensor) -> torch.Tensor:
+        self.num_described += 1
+        return super().describe_cells(cells)
+
+    def encode_text(self, text: str) -> TextFeatures:
+        self.texts.append(text)
+        return super().encode_text(text)
+
+
+def test_second_question_runs_the_text_tower_alone(table_views: tuple[CameraView, ...]) -> None:
+    encoder = CountingEncoder()
+    lifter = MultiViewLifter(encoder)
+    first = lifter.perceive(table_views, "give me the red ball")
+    assert (encoder.num_images, encoder.num_described) == (3, 1)
+    encoder.texts.clear()
+    # Other objects with the same contents: what counts is what they hold.
+    again = [
+        replace(view, rgb=view.rgb.copy(), depth_m=view.depth_m.copy()) for view in table_views
+    ]
+    second = lifter.perceive(again, "give me the blue cylinder")
+    assert (encoder.num_images, encoder.num_described) == (3, 1)
+    assert encoder.texts == ["blue cylinder", "give me the blue cylinder"]
+    assert np.shares_memory(second.features.features, first.features.features)
+    # Depth alone changed: the cloud is made anew, from the images encoded before.
+    moved = replace(again[0], depth_m=again[0].depth_m + np.float32(0.001))
+    lifter.perceive([moved, *again[1:]], "give me the blue cylinder")
+    assert (encoder.num_images, encoder.num_described) == (3, 2)
+
+
+def test_lifting_of_cells_equals_lifting_of_maps(table_views: tuple[CameraView, ...]) -> None:
+    encoder = EmbeddedEncoder(EmbeddedEncoderConfig(long_side=160, precision="float32"))
+    cloud = MultiViewLifter(encoder).lift(table_views).cloud
+    views = sorted(table_views, key=lambda view: view.name)
+    maps = encoder.encode_dense([view.rgb for view in views])
+    lifted = lift_features(cloud.points, views, maps, LiftingConfig())
+    np.testing.assert_allclose(cloud.features, lifted.features, atol=1e-5)
+    np.testing.assert_array_equal(cloud.confidence, lifted.confidence)
 
 
 def test_only_new_images_are_encoded(

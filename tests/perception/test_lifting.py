@@ -144,6 +144,29 @@ def test_bfloat16_turns_features_by_less_than_half_a_degree(
     np.testing.assert_array_equal(full.confidence, half.confidence)
 
 
+def test_only_the_cells_of_points_are_described(table_views: tuple[CameraView, ...]) -> None:
+    generator = torch.Generator().manual_seed(6)
+    cells = torch.randn(3, 18, 32, 5, generator=generator).permute(0, 3, 1, 2)
+    projection = torch.randn(5, 8, generator=generator)
+    seen = []
+
+    def describe(rows: torch.Tensor) -> torch.Tensor:
+        seen.append(len(rows))
+        return torch.tanh(rows @ projection)
+
+    points = _table_points()
+    lifted = lift_features(points, table_views, cells, CONFIG, describe)
+    everything = describe(cells.permute(0, 2, 3, 1)).permute(0, 3, 1, 2)
+    whole = lift_features(points, table_views, everything, CONFIG)
+    np.testing.assert_allclose(lifted.features, whole.features, atol=1e-6)
+    np.testing.assert_array_equal(lifted.confidence, whole.confidence)
+    assert 0 < seen[0] < 200 < 3 * 18 * 32
+    unseen = np.array([[9.0, 9.0, 0.0]], np.float32)
+    np.testing.assert_array_equal(
+        lift_features(unseen, table_views, cells, CONFIG, describe).features, 0.0
+    )
+
+
 def test_maps_may_differ_in_size(table_views: tuple[CameraView, ...]) -> None:
     fine = [_position_map(view, 18, 32) for view in table_views]
     mixed = [fine[0], _position_map(table_views[1], 9, 16), _position_map(table_views[2], 36, 64)]

@@ -158,6 +158,13 @@ FRONT = "{f}/cameras.json: cameras.front"
          "T_world_cam."),
         (_intrinsics(fx=-10.0),
          FRONT + ".intrinsics: fx is -10.0; expected a number above 0."),
+        (_intrinsics(distortion=[0.1, -0.2, 0, 0, 0]),
+         FRONT + ".intrinsics: distortion is [0.1, -0.2, 0, 0, 0]; lens distortion is not undone "
+         "here. Undistort colour and depth first, give the new intrinsics, and leave the "
+         "coefficients out."),
+        (lambda f: _edit(f, lambda d: d["cameras"]["front"].update(k1="big")),
+         FRONT + ": k1 is 'big'; lens distortion is not undone here. Undistort colour and depth "
+         "first, give the new intrinsics, and leave the coefficients out."),
         (_intrinsics(fy=0), FRONT + ".intrinsics: fy is 0; expected a number above 0."),
         (_intrinsics(cx=float("nan")),
          FRONT + ".intrinsics: cx is nan; expected a number above 0."),

@@ -1,6 +1,6 @@
-"""How well a head grounds phrases in held-out pictures, beside the untrained mixture."""
+"""How well encoders ground phrases in held-out pictures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,20 +10,15 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from models.objects.words import ObjectWords
-from perception.encoders.efficientnet import NUM_FINAL_FEATURES
-from perception.encoders.embedded import NUM_CLASSES, TEXT_DIM, EmbeddedEncoder
-from perception.encoders.head import GroundingHead
-from tools.encoder.features import cell_shares
+from perception.encoders.embedded import EmbeddedEncoder
+from tools.encoder.maps import cell_shares
 from tools.encoder.phrases import Concept, concepts_of
 from tools.encoder.pictures import FIRST_OBJECT_ID
-from tools.encoder.shards import VIEWS_PER_LAYOUT, load_shard, shard_paths
+from tools.encoder.shards import VIEWS_PER_LAYOUT, Shard, load_shard, shard_paths
 
 KINDS = ("label", "category", "color", "shape", "function")
 _MIN_VISIBLE_CELLS = 1.5
 _MIN_SHARE = 0.5
-
-Head = Callable[[Tensor], Tensor]
-"""Maps (N, D) cells to (N, 384) unit features."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,12 +26,14 @@ class EvaluationPicture:
     """A held-out picture.
 
     Attributes:
-        cells: (N, D) float16 features of all its cells before the head.
+        shard: The shard that holds it.
+        index: Its index there.
         shares: (N, K) shares of the ids in every cell.
         words: The words of the stage's objects.
     """
 
-    cells: Tensor
+    shard: Shard
+    index: int
     shares: np.ndarray
     words: tuple[ObjectWords, ...]
 
@@ -60,30 +57,10 @@ class Question:
     others: tuple[int, ...]
 
 
-def load_head(path: Path | None, encoder: EmbeddedEncoder) -> Head:
-    """Load a trained head, or take the untrained mixture.
+def load_pictures(folder: Path, split: str) -> list[EvaluationPicture]:
+    """Load a split's pictures: the robot's views and close-ups in turn.
 
     Args:
-        path: File `head.pt` of a run; None for the mixture.
-        encoder: Holds the mixture.
-
-    Returns:
-        The head.
-    """
-    temperature = encoder.config.temperature
-    if path is None:
-        mixture = encoder.head.mixture
-        return lambda cells: mixture(cells[:, :NUM_FINAL_FEATURES].bfloat16(), temperature)
-    head = GroundingHead(num_classes=NUM_CLASSES, text_dim=TEXT_DIM)
-    head.load_state_dict(torch.load(path, weights_only=True))
-    return lambda cells: head(cells.bfloat16(), temperature)
-
-
-def load_pictures(encoder: EmbeddedEncoder, folder: Path, split: str) -> list[EvaluationPicture]:
-    """Compute the cells of a split's pictures: the robot's views and close-ups in turn.
-
-    Args:
-        encoder: The encoder; only its trunk is used.
         folder: Folder of the data.
         split: The split.
 
@@ -96,10 +73,10 @@ def load_pictures(encoder: EmbeddedEncoder, folder: Path, split: str) -> list[Ev
         for layout in range(len(shard.pictures) // VIEWS_PER_LAYOUT):
             index = layout * VIEWS_PER_LAYOUT + 2 * (layout % 3 == 2)
             shares = cell_shares(shard.ids[index])
-            cells = encoder.encode_cells([shard.rgb(index)])[0].half()
             pictures.append(
                 EvaluationPicture(
-                    cells=cells.reshape(-1, cells.shape[-1]),
+                    shard=shard,
+                    index=index,
                     shares=shares.reshape(-1, shares.shape[-1]),
                     words=shard.words,
                 )
@@ -148,18 +125,14 @@ def questions_about(pictures: Sequence[EvaluationPicture]) -> list[Question]:
 
 @torch.no_grad()
 def grounding(
-    head: Head,
-    pictures: Sequence[EvaluationPicture],
-    questions: Sequence[Question],
-    encoder: EmbeddedEncoder,
+    encoder: EmbeddedEncoder, pictures: Sequence[EvaluationPicture], questions: Sequence[Question]
 ) -> dict[str, dict[str, float]]:
     """Answer the questions.
 
     Args:
-        head: The head.
+        encoder: The encoder.
         pictures: The pictures.
-        questions: Questions about them.
-        encoder: Its text tower reads the questions.
+        questions: Questions about them, in the order of the pictures.
 
     Returns:
         For every kind, and "all": "cell", the share whose most similar cell of the picture lies on
@@ -172,7 +145,9 @@ def grounding(
     for question in questions:
         picture = pictures[question.picture]
         if question.picture not in features:
-            features = {question.picture: head(picture.cells.float())}
+            image = picture.shard.rgb(picture.index)
+            maps = encoder.encode_dense([image])[0]
+            features = {question.picture: maps.permute(1, 2, 0).reshape(-1, len(maps))}
         feature = features[question.picture]
         phrase = question.concept.phrases[0]
         if phrase not in texts:
@@ -203,13 +178,13 @@ def format_table(results: dict[str, dict[str, dict[str, float]]]) -> str:
     """Write results as a Markdown table.
 
     Args:
-        results: Results of `grounding` by the name of the head.
+        results: Results of `grounding` by the name of the encoder.
 
     Returns:
         The table, in percent.
     """
     lines = [
-        "| head | measure | " + " | ".join((*KINDS, "all")) + " |",
+        "| encoder | measure | " + " | ".join((*KINDS, "all")) + " |",
         "| --- | --- |" + " ---: |" * (len(KINDS) + 1),
     ]
     for name, result in results.items():

@@ -159,19 +159,21 @@ def truth(
     first = np.stack([p[0] for p in phrases])
     is_name = np.array([c.kind == "name" for c in concepts])
     mentioned = np.array([[color in c.word.split() for color in COLORS] for c in concepts])
-    heads = np.array([c.word.split()[-1] for c in concepts])
+    _, heads = np.unique([c.word.split()[-1] for c in concepts], return_inverse=True)
+    color_rows = [(i, COLORS.index(c.word)) for i, c in enumerate(concepts) if c.kind == "color"]
     labels = np.zeros((len(concepts), len(objects)), np.int8)
     for column, words in enumerate(objects):
         own = [row[c.kind, c.word] for c in concepts_of(words) if (c.kind, c.word) in row]
         names = [i for i in own if is_name[i]]
         near = _near_colors(words)
         contradicts = (mentioned & ~near).any(axis=1) & bool(words.colors)
-        alike = (first @ first[names].T > _SIMILAR).any(axis=1) | np.isin(heads, heads[names])
+        alike = (first @ first[names].T).max(axis=1, initial=-1.0) > _SIMILAR
+        has_head = np.zeros(heads.max() + 1, bool)
+        has_head[heads[names]] = True
+        alike |= has_head[heads]
         label = np.where(is_name & alike & ~contradicts, IGNORED, NEGATIVE).astype(np.int8)
-        for i, concept in enumerate(concepts):
-            if concept.kind == "color":
-                unclear = not words.colors or near[COLORS.index(concept.word)]
-                label[i] = IGNORED if unclear else NEGATIVE
+        for i, color in color_rows:
+            label[i] = IGNORED if not words.colors or near[color] else NEGATIVE
         if words.category == "cup" and ("category", "container") in row:
             label[row["category", "container"]] = IGNORED
         label[own] = POSITIVE
