@@ -3,14 +3,19 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from policy.actions import ActionCandidates, ActionScores
 from policy.errors import InvalidConfigError
-from policy.observation import Observation
+from policy.observation import Observation, PlaceSide
+
+_POSITIVE = (
+    "smoothing_radius_m", "pick_sigma_m", "place_sigma_m", "inside_sigma_m", "ring_m",
+    "ring_sigma_m", "min_support",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +31,16 @@ class GroundingConfig:
             similar meaning; 0.9 would leave fragments of one object.
         pick_sigma_m: Width of the kernel around a grasp's contact point: the half-width of a
             22 mm finger pad, plus the few millimetres that the cloud is off.
-        place_sigma_m: Width of the kernel for placing. A place pose stands over a region or
-            beside it (rings around a reference start 50 mm from its edge), so it's wider.
+        place_sigma_m: Width of the kernel for placing where the relation is not known. A place
+            pose stands over a region or beside it (rings around a reference start 50 mm from its
+            edge), so it's wider.
+        grow_level: Where the relation is known, the region is grown to connected points that reach
+            this share, so that it covers the reference and has its edge and middle.
+        inside_sigma_m: Distance from the reference's middle, seen from above, at which a place
+            inside loses 0.4 of its score.
+        ring_m: Best distance from the reference's edge for a place around it: the middle of the
+            protocol's ring of 0.05 to 0.15 m.
+        ring_sigma_m: Deviation from that at which such a place loses 0.4 of its score.
         min_support: Kernel mass, in points of full confidence at the contact, at which a
             candidate's local evidence counts half. Keeps one stray point from deciding.
         region_weight: Share of nearness to the region in the score; the rest is the local mean
@@ -44,6 +57,10 @@ class GroundingConfig:
     region_level: float = 0.7
     pick_sigma_m: float = 0.015
     place_sigma_m: float = 0.05
+    grow_level: float = 0.35
+    inside_sigma_m: float = 0.02
+    ring_m: float = 0.10
+    ring_sigma_m: float = 0.025
     min_support: float = 2.0
     region_weight: float = 0.5
     temperature: float = 0.1
@@ -51,10 +68,11 @@ class GroundingConfig:
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        for name in ("smoothing_radius_m", "pick_sigma_m", "place_sigma_m", "min_support"):
+        for name in _POSITIVE:
             self._check(name, getattr(self, name) > 0, "a value above 0")
         self._check("temperature", self.temperature > 0, "a value above 0")
-        self._check("region_level", 0 < self.region_level < 1, "a value between 0 and 1")
+        for name in ("region_level", "grow_level"):
+            self._check(name, 0 < getattr(self, name) < 1, "a value between 0 and 1")
         self._check("region_weight", 0 <= self.region_weight <= 1, "0 to 1")
         self._check("prior_exponent", self.prior_exponent >= 0, "at least 0")
 
@@ -76,8 +94,9 @@ class GroundingPolicy:
     cloud (0 for the median point, 1 for the most similar region), and gathered around every
     candidate; nearness to the most similar region and the geometric prior complete the score.
 
-    For a place action the similarity is that to the whole instruction, so this policy acts on or
-    beside the reference that is named, without telling "on" from "near".
+    For a place action the similarity is that to the reference: places over the middle of the most
+    similar region win where the relation asks for one inside, places at a distance from its edge
+    where it asks for one around. Without a known relation, places over or beside it win alike.
     """
 
     name = "grounding"
@@ -121,6 +140,9 @@ class GroundingPolicy:
         if smoothed.max() - background < _MIN_CONTRAST:
             return np.zeros(len(candidates))
         region = self._most_similar_region(smoothed, pairs)
+        if observation.side is not None:
+            grown = self._grow(region, smoothed, pairs)
+            return self._place_score(points[grown, :2], observation.side, candidates)
         contrast = smoothed[region].mean() - background
         relevance = np.clip((smoothed - background) / contrast, -1.0, 1.0)
 
@@ -136,6 +158,22 @@ class GroundingPolicy:
         nearness = np.exp(-squared[:, region].min(axis=1) / (2 * sigma_m**2))
         weight = self.config.region_weight
         return weight * nearness + (1 - weight) * local
+
+    def _place_score(
+        self,
+        reference: Float[np.ndarray, "R 2"],
+        side: PlaceSide,
+        candidates: ActionCandidates,
+    ) -> Float[np.ndarray, " K"]:
+        """Score places by where they lie relative to a reference, seen from above."""
+        positions, config = candidates.positions[:, :2], self.config
+        if side == "inside":
+            middle = (reference.min(axis=0) + reference.max(axis=0)) / 2
+            deviation = np.linalg.norm(positions - middle, axis=1) / config.inside_sigma_m
+        else:
+            distance = KDTree(reference).query(positions)[0]
+            deviation = (distance - config.ring_m) / config.ring_sigma_m
+        return np.exp(-(deviation**2) / 2)
 
     def _smooth(
         self, observation: Observation, pairs: Int[np.ndarray, "M 2"]
@@ -159,16 +197,39 @@ class GroundingPolicy:
         self, smoothed: Float[np.ndarray, " N"], pairs: Int[np.ndarray, "M 2"]
     ) -> Int[np.ndarray, " R"]:
         """Indices of the connected set of similar points with the most similarity in total."""
-        background, peak = np.median(smoothed), smoothed.max()
-        excess = smoothed - (background + self.config.region_level * (peak - background))
+        excess = smoothed - _threshold(smoothed, self.config.region_level)
         is_high = excess >= 0
-        edges = pairs[is_high[pairs].all(axis=1)]
-        num_points = len(smoothed)
-        graph = coo_array(
-            (np.ones(len(edges), dtype=bool), (edges[:, 0], edges[:, 1])),
-            shape=(num_points, num_points),
-        )
-        _, labels = connected_components(graph, directed=False)
+        labels = _connected(is_high, pairs)
         # Size and strength together: a lone outlier has no size, a broad faint area no excess.
-        mass = np.bincount(labels[is_high], excess[is_high], num_points)
+        mass = np.bincount(labels[is_high], excess[is_high], len(smoothed))
         return np.flatnonzero(is_high & (labels == mass.argmax()))
+
+    def _grow(
+        self,
+        region: Int[np.ndarray, " R"],
+        smoothed: Float[np.ndarray, " N"],
+        pairs: Int[np.ndarray, "M 2"],
+    ) -> Int[np.ndarray, " G"]:
+        """Add the connected points of lesser similarity to a region."""
+        is_high = smoothed >= _threshold(smoothed, self.config.grow_level)
+        is_high[region] = True
+        labels = _connected(is_high, pairs)
+        return np.flatnonzero(is_high & (labels == labels[region[0]]))
+
+
+def _threshold(smoothed: Float[np.ndarray, " N"], level: float) -> float:
+    """Return the similarity at a share of the way from the median point to the best."""
+    background = float(np.median(smoothed))
+    return background + level * (float(smoothed.max()) - background)
+
+
+def _connected(
+    is_high: Bool[np.ndarray, " N"], pairs: Int[np.ndarray, "M 2"]
+) -> Int[np.ndarray, " N"]:
+    """Label the connected sets of the points that count; pairs are neighbours."""
+    edges = pairs[is_high[pairs].all(axis=1)]
+    graph = coo_array(
+        (np.ones(len(edges), dtype=bool), (edges[:, 0], edges[:, 1])),
+        shape=(len(is_high), len(is_high)),
+    )
+    return connected_components(graph, directed=False)[1]

@@ -12,11 +12,16 @@ from perception.lifter import LifterConfig, MultiViewLifter
 from policy.base import Policy
 from policy.registry import POLICY_NAMES, load_policy
 from sr_mj.candidates.antipodal import AntipodalSampler
-from sr_mj.episode import Pipeline
+from sr_mj.candidates.generator import CandidateGenerator
+from sr_mj.candidates.placing import SurfacePlacer
+from sr_mj.drive import StepHook
 from sr_mj.errors import UnknownNameError, unknown_name_message
-from sr_mj.execution import Executor, StepHook
+from sr_mj.execution import Executor
 from sr_mj.oracle import OraclePolicy
+from sr_mj.perturbation import PosePerturbation
+from sr_mj.pipeline import Pipeline
 from sr_mj.planning import Planner
+from sr_mj.planning.body import RobotBody
 from sr_mj.scene import Scene
 from sr_mj.sensors.l515 import L515NoiseConfig
 from sr_mj.sensors.renderer import CameraRig
@@ -73,12 +78,24 @@ def lifter_for(
     Returns:
         The lifter.
     """
+    return MultiViewLifter(
+        load_encoder(encoder, allow_download=allow_download), lifter_config(workspace)
+    )
+
+
+def lifter_config(workspace: Workspace) -> LifterConfig:
+    """Configure perception for a workspace, which is all that the cloud then holds.
+
+    Args:
+        workspace: The box to look at.
+
+    Returns:
+        The configuration.
+    """
     x, y, z = workspace.lower
     # A little under the table, so that the noise of the table's own points is not cut in half.
     fusion = FusionConfig(workspace_min=(x, y, z - 0.01), workspace_max=workspace.upper)
-    return MultiViewLifter(
-        load_encoder(encoder, allow_download=allow_download), LifterConfig(fusion=fusion)
-    )
+    return LifterConfig(fusion=fusion)
 
 
 @contextmanager
@@ -87,8 +104,11 @@ def assembled(
     *,
     lifter: MultiViewLifter,
     policy: Policy,
+    generator: CandidateGenerator | None = None,
     planner: Planner | None = None,
     on_step: StepHook | None = None,
+    perturbation: PosePerturbation | None = None,
+    keep_unreachable: bool = False,
 ) -> Iterator[Pipeline]:
     """Assemble the stages for a scene; the renderer is freed at the end.
 
@@ -96,8 +116,11 @@ def assembled(
         scene: The scene.
         lifter: Perception stage.
         policy: Policy.
+        generator: Generator of grasps; the antipodal sampler when None.
         planner: Planner; a new one when None.
         on_step: Called after every simulation step.
+        perturbation: Error of executed poses.
+        keep_unreachable: Whether candidates that cannot be reached are left to the policy.
 
     Yields:
         The pipeline.
@@ -107,8 +130,12 @@ def assembled(
             rig=rig,
             noise=L515NoiseConfig(),
             lifter=lifter,
-            generator=AntipodalSampler(),
+            generator=generator or AntipodalSampler(),
+            placer=SurfacePlacer(),
             policy=policy,
             planner=planner or Planner(),
             executor=Executor(scene, on_step=on_step),
+            robot=RobotBody(),
+            perturbation=perturbation,
+            keep_unreachable=keep_unreachable,
         )

@@ -1,60 +1,66 @@
 """Executes a `Plan` in the simulation and says what came of it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 
-import mujoco
 import numpy as np
 
-from models.gripper import finger_travel
-from models.robot import ARM_ACTUATORS, ARM_JOINTS, GRIPPER_ACTUATOR, GRIPPER_JOINTS, TOOL_SITE_NAME
+from sr_mj.drive import DriveConfig, RobotDrive, StepHook
+from sr_mj.judge import Judge, object_in_gripper, touching_fingers
 from sr_mj.outcome import Outcome, Reason
 from sr_mj.planning import Phase, Plan, Segment
 from sr_mj.scene import Scene
+from sr_mj.scene.placement import find_object
 from sr_mj.scene.settle import check_stable
-
-StepHook = Callable[[Scene], None]
-"""Called after every simulation step of an execution, for example to record a video."""
+from sr_mj.trajectory import MotionLimits, time_waypoints
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExecutionConfig:
-    """Speeds, thresholds and limits; every time is simulated time.
+    """Thresholds and limits; every time is simulated time.
 
     Attributes:
-        finger_speed: Speed at which the commanded opening changes, m/s.
-        arrive_tol_rad: Largest joint error with which a motion counts as finished.
-        arrive_limit_s: Longest wait for that after a motion's nominal end.
-        blocked_tol_rad: Joint error at the end of the approach from which on something is in the
-            way: 0.01 rad is about 5 mm at the tool.
-        close_limit_s: Longest time that the fingers may take; what they press on may tremble.
-        still_speed: Finger speed below which they have stopped, m/s.
-        still_for_s: How long they must have stopped.
-        empty_width_m: Opening at or under which nothing is between the fingers.
+        drive: Speeds and tolerances of the robot.
+        blocked_tol_rad: Joint error at the end of a motion towards objects from which on something
+            is in the way: 0.01 rad is about 5 mm at the tool.
+        guard_rad: Joint error at which lowering stops, since what is held has touched down.
         release_s: Wait after opening over the bin.
+        release_speed: Speed of the opening where something is put down, m/s.
+        part_s: Wait after that, before the fingers leave.
         min_rise_m: How far an object must have risen to count as lifted.
         max_slip_m: How far a held object may move in the gripper between lift and carry's end.
+        settle_limit_s: Longest wait, after placing, until everything lies still.
+        calm_for_s: How long it must lie still.
     """
 
-    finger_speed: float = 0.15
-    arrive_tol_rad: float = 0.004
-    arrive_limit_s: float = 0.5
+    drive: DriveConfig = field(default_factory=DriveConfig)
     blocked_tol_rad: float = 0.02
-    close_limit_s: float = 2.0
-    still_speed: float = 0.002
-    still_for_s: float = 0.06
-    empty_width_m: float = 0.0015
+    guard_rad: float = 0.02
     release_s: float = 0.4
+    release_speed: float = 0.04
+    part_s: float = 0.2
     min_rise_m: float = 0.05
     max_slip_m: float = 0.03
+    settle_limit_s: float = 5.0
+    calm_for_s: float = 0.1
+
+
+_CALM_INTERVAL_S = 0.05
+_RETREAT_WAYPOINTS = 12
+_WAKING_SPEED = 0.01
+_RETREAT_LIMITS = MotionLimits().scaled(0.35)
 
 
 class Executor:
     """Drives the robot of one scene.
 
+    What the robot does depends on what it feels in its joints and fingers alone; what is reported
+    of it, and whether an object is kept or dropped into the bin, on the true state.
+
     Args:
         scene: The scene; its `data` is stepped.
-        config: Speeds and thresholds.
+        config: Thresholds and limits.
         on_step: Called after every simulation step.
     """
 
@@ -62,161 +68,184 @@ class Executor:
         self, scene: Scene, config: ExecutionConfig | None = None, on_step: StepHook | None = None
     ) -> None:
         """Look up the robot's joints and actuators."""
-        model = scene.model
         self.config = config or ExecutionConfig()
-        self._scene, self._model, self._data = scene, model, scene.data
-        self._on_step = on_step
-        self._arm_qpos = np.array([model.joint(name).qposadr[0] for name in ARM_JOINTS])
-        self._arm_ctrl = np.array([model.actuator(name).id for name in ARM_ACTUATORS])
-        self._finger_qpos = np.array([model.joint(name).qposadr[0] for name in GRIPPER_JOINTS])
-        self._finger_dofs = np.array([model.joint(name).dofadr[0] for name in GRIPPER_JOINTS])
-        self._finger_ctrl = model.actuator(GRIPPER_ACTUATOR).id
-        self._tool_site = model.site(TOOL_SITE_NAME).id
-        # A position servo lags behind a moving target by velocity * kv / kp; leading the command
-        # by as much cancels it.
-        gains = model.actuator_gainprm[self._arm_ctrl, 0]
-        self._lead_s = -model.actuator_biasprm[self._arm_ctrl, 2] / gains
+        self.drive = RobotDrive(scene, self.config.drive, on_step)
+        self._scene = scene
+        self._T_world_grasp: np.ndarray | None = None
 
     @property
-    def width_m(self) -> float:
-        """Distance between the finger pads, as the robot measures it."""
-        return float(self._data.qpos[self._finger_qpos].sum())
+    def T_world_grasp(self) -> np.ndarray | None:
+        """Pose (4, 4) of the tool, by its joints, at which it last closed on something."""
+        return self._T_world_grasp
 
-    def execute(self, plan: Plan) -> Outcome:
+    def execute(self, plan: Plan, *, keep_target: bool = False) -> Outcome:
         """Execute a plan to its end, and judge it by the objects' motion.
 
         A real robot feels an empty or lost grasp by its fingers; so does this one, and then
-        returns home without visiting the bin.
+        returns home.
 
         Args:
             plan: What to do.
+            keep_target: Whether a target that was picked stays in the closed gripper over the bin,
+                for a plan to place it; anything else is dropped into the bin.
 
         Returns:
-            The outcome; `success` says whether a target was held through lift and carry.
+            The outcome.
         """
-        start_time = self._data.time
+        start_time = self._scene.data.time
+        judge = Judge(self._scene)
         segments = {segment.phase: segment for segment in plan.segments}
-        reason, grasped = self._attempt(segments)
-        check_stable(self._data)
-        elapsed = self._data.time - start_time
-        return Outcome(
-            success=reason is Reason.GRASPED_TARGET,
-            reason=reason,
-            grasped=grasped,
-            num_steps=round(elapsed / self._model.opt.timestep),
+        if plan.kind == "pick":
+            outcome = self._pick(plan, segments, judge, keep_target)
+        else:
+            outcome = self._place(segments, judge)
+        check_stable(self._scene.data)
+        elapsed = self._scene.data.time - start_time
+        return replace(
+            outcome,
+            num_steps=round(elapsed / self._scene.model.opt.timestep),
             simulated_s=round(elapsed, 3),
         )
 
-    def _attempt(self, segments: dict[Phase, Segment]) -> tuple[Reason, str | None]:
-        before = self._heights()
+    def _pick(
+        self, plan: Plan, segments: dict[Phase, Segment], judge: Judge, keep_target: bool
+    ) -> Outcome:
+        reason, held = self._grasp(segments, judge)
+        if reason.is_grasp:
+            is_kept = keep_target and reason is Reason.GRASPED_TARGET
+            if not is_kept:
+                self._drop_into_bin(segments)
+        knocked_off = judge.knocked_off(held if reason.is_grasp else None)
+        if knocked_off and reason in (Reason.APPROACH_COLLISION, Reason.EMPTY_CLOSE):
+            reason = Reason.KNOCKED_OFF
+        success = reason is Reason.GRASPED_TARGET
+        return Outcome(
+            success=success,
+            reason=reason,
+            grasped=held if reason.is_grasp else None,
+            knocked_off=knocked_off,
+            reward=1.0 if success else judge.grasp_reward(plan.T_world_tool[:3, 3]),
+        )
+
+    def _grasp(self, segments: dict[Phase, Segment], judge: Judge) -> tuple[Reason, str | None]:
+        """Reach, close, lift and carry; a grasp that is felt to be empty ends at home."""
         self._move(segments[Phase.TRANSIT])
         error = self._move(segments[Phase.APPROACH])
         if error > self.config.blocked_tol_rad:
             self._go_back(segments, (Phase.APPROACH, Phase.TRANSIT))
             return Reason.APPROACH_COLLISION, None
-        self._close()
-        if self.width_m <= self.config.empty_width_m:
+        self.drive.close()
+        if not self.drive.feels_object:
             self._go_back(segments, (Phase.APPROACH, Phase.TRANSIT))
             return Reason.EMPTY_CLOSE, None
+        self._T_world_grasp = self.drive.T_world_tool
         self._move(segments[Phase.LIFT])
-        held = self._lifted_object(before)
-        if held is None:
-            self._move(segments[Phase.CARRY])
-            self._finish(segments)
-            return Reason.SLIPPED_LIFT, None
-        grip = self._position_in_tool(held)
+        held = judge.lifted_object(self.config.min_rise_m)
+        grip = np.zeros(3) if held is None else judge.position_in_tool(held)
         self._move(segments[Phase.CARRY])
-        slip = np.linalg.norm(self._position_in_tool(held) - grip)
-        self._finish(segments)
-        if slip > self.config.max_slip_m:
-            return Reason.SLIPPED_CARRY, None
+        if not self.drive.feels_object:
+            self._move(segments[Phase.RETURN])
+            return (Reason.SLIPPED_LIFT if held is None else Reason.SLIPPED_CARRY), held
+        if held is None:
+            self._drop_into_bin(segments)
+            return Reason.SLIPPED_LIFT, None
+        if np.linalg.norm(judge.position_in_tool(held) - grip) > self.config.max_slip_m:
+            self._drop_into_bin(segments)
+            return Reason.SLIPPED_CARRY, held
         is_target = held in self._scene.goal.targets
         return (Reason.GRASPED_TARGET if is_target else Reason.GRASPED_OTHER), held
 
-    def _finish(self, segments: dict[Phase, Segment]) -> None:
+    def _place(self, segments: dict[Phase, Segment], judge: Judge) -> Outcome:
+        moved = object_in_gripper(self._scene)
+        judge.begin_place(moved)
+        self._move(segments[Phase.TRANSIT])
+        followed = self._lower(segments[Phase.LOWER])
+        is_lost = not self.drive.feels_object
+        if moved is not None:
+            is_lost |= object_in_gripper(self._scene) != moved
+            judge.begin_release(moved)
+        with self._waking():
+            self.drive.let_go(segments[Phase.RELEASE].width_m, self.config.release_speed)
+        self.drive.hold(self.config.part_s)
+        self._retreat(segments, followed)
+        self._move(segments[Phase.RETURN])
+        self._settle(judge)
+        return self._judge_place(judge, moved, is_lost)
+
+    def _judge_place(self, judge: Judge, moved: str | None, is_lost: bool) -> Outcome:
+        if moved is None:
+            return Outcome(success=False, reason=Reason.SLIPPED_CARRY)
+        reason, missed = judge.place_reason(moved), judge.missed_m(moved)
+        if is_lost and reason is not Reason.PLACED:
+            reason = Reason.SLIPPED_CARRY
+        diagonal = self._scene.workspace.diagonal_m
+        success = reason is Reason.PLACED
+        return Outcome(
+            success=success,
+            reason=reason,
+            grasped=moved,
+            knocked_off=judge.knocked_off(moved),
+            reward=1.0 if success else -1.0 if missed is None else -min(missed / diagonal, 1.0),
+            missed_m=None if missed is None else round(missed, 4),
+        )
+
+    def _lower(self, segment: Segment) -> float:
+        """Lower until the end or until something is touched; return the seconds followed."""
+        assert segment.trajectory is not None
+        return self.drive.move(segment.trajectory, segment.width_m, guard_rad=self.config.guard_rad)
+
+    def _retreat(self, segments: dict[Phase, Segment], followed: float) -> None:
+        """Leave what was put down, also from where lowering was stopped on the way."""
+        lower, retreat = segments[Phase.LOWER].trajectory, segments[Phase.RETREAT]
+        assert lower is not None and retreat.trajectory is not None
+        if followed == lower.duration_s:
+            self._move(retreat)
+            return
+        # The same way as planned, beginning where the arm is: going to its start would press.
+        u = np.linspace(0, 1, _RETREAT_WAYPOINTS)[:, None]
+        waypoints = retreat.trajectory.path(u[:, 0])
+        waypoints = waypoints + (1 - u) * (self.drive.arm_qpos - waypoints[0])
+        self.drive.move(time_waypoints(waypoints, _RETREAT_LIMITS), retreat.width_m)
+
+    def _settle(self, judge: Judge) -> None:
+        """Wait until everything lies still, or has had long enough to."""
+        calm = waited = 0.0
+        while calm < self.config.calm_for_s and waited < self.config.settle_limit_s:
+            self.drive.hold(_CALM_INTERVAL_S)
+            waited += _CALM_INTERVAL_S
+            calm = calm + _CALM_INTERVAL_S if judge.is_calm() else 0.0
+
+    @contextmanager
+    def _waking(self) -> Iterator[None]:
+        """Wake, afterwards, what the fingers let go of.
+
+        MuJoCo counts what the fingers hold as at rest, lets it sleep as soon as they have parted,
+        and leaves it hanging in the air. Pushed down by 1 cm/s, it falls.
+        """
+        released = touching_fingers(self._scene)
+        yield
+        for name in released:
+            dof = find_object(self._scene, name).body.dof_adr
+            self._scene.data.qvel[dof + 2] -= _WAKING_SPEED
+
+    def _drop_into_bin(self, segments: dict[Phase, Segment]) -> None:
         """Open over the bin and go home."""
-        self._set_width(segments[Phase.RELEASE].width_m)
-        self._hold(self.config.release_s)
+        with self._waking():
+            self.drive.set_width(segments[Phase.RELEASE].width_m)
+        self.drive.hold(self.config.release_s)
         self._move(segments[Phase.RETURN])
 
     def _go_back(self, segments: dict[Phase, Segment], phases: tuple[Phase, ...]) -> None:
         """Open to what the approach had, and take the way back that the arm came."""
-        self._set_width(segments[phases[0]].width_m)
+        self.drive.set_width(segments[phases[0]].width_m)
         for phase in phases:
-            self._move(segments[phase], reverse=True)
-        self._set_width(0.0)
+            segment = segments[phase]
+            assert segment.trajectory is not None
+            self.drive.move(segment.trajectory, segment.width_m, reverse=True)
+        self.drive.set_width(0.0)
 
-    def _move(self, segment: Segment, *, reverse: bool = False) -> float:
-        """Follow a trajectory, fingers moving along; return the joint error at its end."""
-        trajectory = segment.trajectory
-        assert trajectory is not None
-        step = self._model.opt.timestep
-        times = np.arange(1, int(np.ceil(trajectory.duration_s / step)) + 1) * step
-        qpos, qvel = trajectory.sample(trajectory.duration_s - times if reverse else times)
-        commands = qpos + self._lead_s * (-qvel if reverse else qvel)
-        goal = trajectory.start if reverse else trajectory.end
-        for command in commands:
-            self._step(command, segment.width_m)
-        waited = 0.0
-        while (
-            self._error(goal) > self.config.arrive_tol_rad and waited < self.config.arrive_limit_s
-        ):
-            self._step(goal, segment.width_m)
-            waited += step
-        self._data.ctrl[self._arm_ctrl] = goal
-        return self._error(goal)
-
-    def _error(self, goal: np.ndarray) -> float:
-        return float(np.abs(self._data.qpos[self._arm_qpos] - goal).max())
-
-    def _step(self, arm_command: np.ndarray | None, width_m: float) -> None:
-        """Advance one time step; the commanded opening moves at finite speed."""
-        step = self._model.opt.timestep
-        if arm_command is not None:
-            self._data.ctrl[self._arm_ctrl] = arm_command
-        travel = self._data.ctrl[self._finger_ctrl]
-        largest = self.config.finger_speed / 2 * step
-        change = np.clip(finger_travel(width_m) - travel, -largest, largest)
-        self._data.ctrl[self._finger_ctrl] = travel + change
-        mujoco.mj_step(self._model, self._data)
-        if self._on_step is not None:
-            self._on_step(self._scene)
-
-    def _hold(self, seconds: float) -> None:
-        for _ in range(round(seconds / self._model.opt.timestep)):
-            self._step(None, 2 * self._data.ctrl[self._finger_ctrl])
-
-    def _set_width(self, width_m: float) -> None:
-        """Command an opening and simulate until the command has got there."""
-        target = finger_travel(width_m)
-        while abs(self._data.ctrl[self._finger_ctrl] - target) > 1e-9:
-            self._step(None, width_m)
-
-    def _close(self) -> None:
-        """Close until the fingers stop against something or each other, or time is up."""
-        step = self._model.opt.timestep
-        still = waited = 0.0
-        closing = True
-        while closing and waited < self.config.close_limit_s:
-            self._step(None, 0.0)
-            speed = np.abs(self._data.qvel[self._finger_dofs]).max()
-            still = still + step if speed < self.config.still_speed else 0.0
-            waited += step
-            closing = still < self.config.still_for_s or self._data.ctrl[self._finger_ctrl] > 0
-
-    def _heights(self) -> dict[str, float]:
-        return {item.name: self._data.xipos[item.body.body_id][2] for item in self._scene.objects}
-
-    def _lifted_object(self, before: dict[str, float]) -> str | None:
-        """Return the object that rose and is nearest to the tool, if any."""
-        rises = {n: z - before[n] for n, z in self._heights().items()}
-        lifted = [name for name, rise in rises.items() if rise > self.config.min_rise_m]
-        return min(
-            lifted, key=lambda n: float(np.linalg.norm(self._position_in_tool(n))), default=None
-        )
-
-    def _position_in_tool(self, name: str) -> np.ndarray:
-        """Return an object's centre of mass (3,) in the tool frame."""
-        body = next(item.body for item in self._scene.objects if item.name == name)
-        offset = self._data.xipos[body.body_id] - self._data.site_xpos[self._tool_site]
-        return self._data.site_xmat[self._tool_site].reshape(3, 3).T @ offset
+    def _move(self, segment: Segment) -> float:
+        """Follow a segment's trajectory; return the joint error at its end, rad."""
+        assert segment.trajectory is not None
+        self.drive.move(segment.trajectory, segment.width_m)
+        return self.drive.error(segment.trajectory.end)

@@ -1,8 +1,7 @@
-"""Inverse kinematics of the arm with mink, and collision checks of arm postures.
+"""Inverse kinematics of the arm with mink, in a model of what the robot knows for certain.
 
-The planner owns a model of what the robot knows of its surroundings: itself, the table and the
-bin, the gripper as rigid boxes. It never sees the scene's objects; those are kept clear by the
-candidate generator's checks against the cloud and by carrying everything over the heap.
+That model holds the robot, the table and the bin, the gripper as rigid open boxes. It never sees
+the scene's objects; the planner checks its paths against the cloud of points.
 """
 
 from dataclasses import dataclass
@@ -14,12 +13,15 @@ from dm_control import mjcf
 
 from models.gripper_geometry import ROBOTIQ_2F85_CLASS
 from models.robot import ARM_JOINTS, ROBOT_PREFIX
-from models.tabletop import build_tabletop
-from models.ur5 import HOME_QPOS, TOOL_FLANGE_SITE, build_ur5
+from models.tabletop import TABLE_GEOM, build_tabletop
+from models.ur5 import MAX_JOINT_SPEED, TOOL_FLANGE_SITE, build_ur5
 
-_TOOL_SITE = "tool"
+TOOL_SITE = f"{ROBOT_PREFIX}gripper/tool"
+"""Name of the tool's site in the planning model."""
+
 _SOLVER = "daqp"
-_DT = 0.1
+# At full speed no joint turns farther in a step than the solver sees collisions coming.
+_DT = 0.04
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +36,8 @@ class IkConfig:
             between postures that reach the pose equally well.
         max_overlap_m: Overlap of links, gripper, table and bin that still counts as free; the
             fingertips of a low grasp may brush the table.
+        avoid_m: Distance from which on the solver slows links, gripper, table and bin down when
+            they near each other.
     """
 
     max_iterations: int = 60
@@ -41,9 +45,10 @@ class IkConfig:
     angle_tol_rad: float = 2e-3
     posture_cost: float = 1e-4
     max_overlap_m: float = 0.001
+    avoid_m: float = 0.12
 
 
-def _build_planning_model() -> mujoco.MjModel:
+def build_planning_model() -> mujoco.MjModel:
     """Compile arm, rigid open gripper, table and bin: six degrees of freedom."""
     geometry = ROBOTIQ_2F85_CLASS
     arm = build_ur5()
@@ -52,11 +57,19 @@ def _build_planning_model() -> mujoco.MjModel:
     body = gripper.worldbody.add("body", name="gripper", pos=(0, 0, geometry.flange_to_tool_m))
     for center, half in zip(*geometry.boxes(geometry.max_width_m), strict=True):
         body.add("geom", type="box", pos=center, size=half, mass=0.3)
-    body.add("site", name=_TOOL_SITE)
+    body.add("site", name=TOOL_SITE.rpartition("/")[2])
     flange.attach(gripper)
     root = build_tabletop("planning")
     root.attach(arm)
     return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+
+
+def _solid_geoms(model: mujoco.MjModel) -> tuple[list[int], list[int]]:
+    """Geoms of the robot that can collide, and those of table and bin."""
+    names = [model.geom(geom).name for geom in range(model.ngeom)]
+    robot = np.flatnonzero((model.geom_bodyid > model.body("bin").id) & (model.geom_contype > 0))
+    fixed = [i for i, name in enumerate(names) if name == TABLE_GEOM or name.startswith("bin_")]
+    return robot.tolist(), fixed
 
 
 class ArmKinematics:
@@ -67,24 +80,30 @@ class ArmKinematics:
     """
 
     def __init__(self, config: IkConfig | None = None) -> None:
-        """Compile the planning model."""
+        """Compile the planning model and set up mink's tasks and limits."""
         self.config = config or IkConfig()
-        self._model = _build_planning_model()
+        self._model = build_planning_model()
         self._configuration = mink.Configuration(self._model)
-        self._site = f"{ROBOT_PREFIX}gripper/{_TOOL_SITE}"
         self._frame_task = mink.FrameTask(
-            self._site, "site", position_cost=1.0, orientation_cost=0.3, lm_damping=1e-6
+            TOOL_SITE, "site", position_cost=1.0, orientation_cost=0.3, lm_damping=1e-6
         )
         self._posture_task = mink.PostureTask(self._model, cost=self.config.posture_cost)
+        robot, fixed = _solid_geoms(self._model)
         self._limits = [
             mink.ConfigurationLimit(self._model),
-            mink.VelocityLimit(self._model, dict.fromkeys(ARM_JOINTS, 2 * np.pi)),
+            mink.VelocityLimit(self._model, dict.fromkeys(ARM_JOINTS, MAX_JOINT_SPEED)),
+            mink.CollisionAvoidanceLimit(
+                self._model,
+                [(robot, fixed), (robot, robot)],
+                minimum_distance_from_collisions=-self.config.max_overlap_m,
+                collision_detection_distance=self.config.avoid_m,
+            ),
         ]
 
     def tool_pose(self, qpos: np.ndarray) -> np.ndarray:
         """Return the (4, 4) pose of the tool for joint angles (6,)."""
         self._configuration.update(np.asarray(qpos, float))
-        return self._configuration.get_transform_frame_to_world(self._site, "site").as_matrix()
+        return self._configuration.get_transform_frame_to_world(TOOL_SITE, "site").as_matrix()
 
     def solve(self, T_world_tool: np.ndarray, start: np.ndarray) -> np.ndarray | None:
         """Solve IK from one start posture.
@@ -94,11 +113,11 @@ class ArmKinematics:
             start: (6,) joint angles, rad; also the posture to stay near.
 
         Returns:
-            (6,) joint angles within the joint limits, or None if the pose was not reached.
+            (6,) joint angles within the joint limits, or None if the pose was not reached: it is
+            out of reach, or links, gripper, table or bin are in each other's way.
         """
-        target = mink.SE3.from_matrix(np.asarray(T_world_tool, float))
         self._configuration.update(np.asarray(start, float))
-        self._frame_task.set_target(target)
+        self._frame_task.set_target(mink.SE3.from_matrix(np.asarray(T_world_tool, float)))
         self._posture_task.set_target(np.asarray(start, float))
         tasks = [self._frame_task, self._posture_task]
         for _ in range(self.config.max_iterations):
@@ -117,39 +136,24 @@ class ArmKinematics:
             self._configuration.integrate_inplace(velocity, _DT)
         return None
 
-    def solve_any(self, T_world_tool: np.ndarray) -> list[np.ndarray]:
-        """Solve IK from several start postures, elbow up, facing the pose.
+    def follow(
+        self, Ts_world_tool: np.ndarray, start: np.ndarray, max_joint_step: float
+    ) -> np.ndarray | None:
+        """Follow a path of the tool from a posture that has reached its first pose.
 
         Args:
-            T_world_tool: (4, 4) pose to reach.
+            Ts_world_tool: (P, 4, 4) poses, close to each other.
+            start: (6,) posture at the first pose, rad.
+            max_joint_step: Largest joint motion between two poses, rad; more means that the arm
+                would flip from one branch of postures to another.
 
         Returns:
-            Distinct solutions (6,) free of collision, nearest to home first; empty if the pose
-            cannot be reached.
+            (P, 6) postures, or None if a pose was not reached.
         """
-        solutions: list[np.ndarray] = []
-        for start in self._start_postures(T_world_tool):
-            solution = self.solve(T_world_tool, start)
-            if solution is None or not self.is_free(solution):
-                continue
-            if all(np.abs(solution - other).max() > 0.1 for other in solutions):
-                solutions.append(solution)
-        return sorted(solutions, key=lambda q: float(np.abs(q - HOME_QPOS).max()))
-
-    def is_free(self, qpos: np.ndarray) -> bool:
-        """Tell whether a posture (6,) collides neither with table, bin nor the robot itself."""
-        self._configuration.update(np.asarray(qpos, float))
-        data = self._configuration.data
-        mujoco.mj_collision(self._model, data)
-        return not np.any(data.contact.dist[: data.ncon] < -self.config.max_overlap_m)
-
-    def _start_postures(self, T_world_tool: np.ndarray) -> list[np.ndarray]:
-        """Return start postures whose pan joint already faces the pose, wrist turned both ways."""
-        x, y = T_world_tool[:2, 3]
-        # The tool hangs 0.109 m beside the plane of upper arm and forearm.
-        pan = np.arctan2(y, x) - np.arcsin(np.clip(0.10915 / max(np.hypot(x, y), 0.12), -1, 1))
-        reach = np.array([pan, -0.55 * np.pi, 0.55 * np.pi, -0.5 * np.pi, -0.5 * np.pi, 0.0])
-        # Yaw of the tool's x axis about the vertical fixes the last joint.
-        yaw = np.arctan2(T_world_tool[1, 0], T_world_tool[0, 0])
-        wrist = (pan - np.pi / 2 - yaw + np.pi) % (2 * np.pi) - np.pi
-        return [np.r_[reach[:5], wrist + turn] for turn in (0.0, np.sign(-wrist or 1) * 2 * np.pi)]
+        path = [np.asarray(start, float)]
+        for pose in Ts_world_tool[1:]:
+            posture = self.solve(pose, path[-1])
+            if posture is None or np.abs(posture - path[-1]).max() > max_joint_step:
+                return None
+            path.append(posture)
+        return np.array(path)

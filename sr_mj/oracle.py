@@ -6,6 +6,8 @@ from scipy.spatial import KDTree
 from models.gripper_geometry import ROBOTIQ_2F85_CLASS
 from policy.actions import ActionCandidates, ActionScores
 from policy.observation import Observation
+from sr_mj.judge import object_in_gripper
+from sr_mj.oracle_place import score_places
 from sr_mj.scene import Scene, SceneObject
 
 _ON_TARGET = 10.0
@@ -20,12 +22,12 @@ def _surface_points(item: SceneObject) -> np.ndarray:
 
 
 class OraclePolicy:
-    """Chooses, by ground truth, a grasp that closes on a target, else one that clears the way.
+    """Chooses by ground truth: a grasp that closes on a target, a place well inside the region.
 
-    A candidate that would close on an object of the target set beats every other; among those,
-    the geometric prior decides. If there is none, the candidate nearest to a target wins: it most
-    likely removes what lies on it or beside it. Privileged: it reads object poses and the target
-    set, which no real robot has.
+    Picking, a candidate that would close on an object of the target set beats every other; among
+    those, the geometric prior decides. If there is none, the candidate nearest to a target wins:
+    it most likely removes what lies on it or beside it. Placing, see `score_places`. Privileged: it
+    reads object poses and the goal's objects, which no real robot can.
 
     Args:
         scene: The scene that is acted in; read at every decision.
@@ -45,13 +47,18 @@ class OraclePolicy:
 
         Args:
             observation: Ignored.
-            candidates: K grasps.
+            candidates: K grasps or places.
             rng: Ignored.
 
         Returns:
-            Logits: 10 + prior on a target, otherwise prior - distance to the nearest target in
-            decimetres.
+            Logits. Of grasps: 10 + prior on a target, otherwise prior - distance to the nearest
+            target in decimetres. Of places: see `score_places`.
         """
+        if candidates.kind == "place":
+            moved = object_in_gripper(self._scene)
+            if moved is None:
+                return ActionScores(logits=candidates.prior)
+            return ActionScores(logits=score_places(self._scene, moved, candidates))
         targets = self._scene.goal.targets
         if not len(candidates) or not targets:
             return ActionScores(logits=candidates.prior)
@@ -69,22 +76,15 @@ class OraclePolicy:
 
     def _points_between_fingers(self, name: str, candidates: ActionCandidates) -> np.ndarray:
         """Count an object's surface points in the space that each candidate's pads sweep (K,)."""
-        rotations, origins = candidates.Ts_world_tool[:, :3, :3], candidates.positions
-        points = self._world_points(name)
-        local = (
-            np.einsum("pi,kij->kpj", points, rotations)
-            - np.einsum("ki,kij->kj", origins, rotations)[:, None]
-        )
         pad_y, pad_z = ROBOTIQ_2F85_CLASS.pad_half_m
-        half = np.stack(
-            [
-                candidates.width_m / 2 + _SIDE_MARGIN_M,
-                np.full(len(candidates), pad_y),
-                np.full(len(candidates), pad_z),
-            ],
-            axis=1,
-        )
-        return np.all(np.abs(local) <= half[:, None], axis=2).sum(axis=1)
+        half_x = candidates.width_m.astype(float) / 2 + _SIDE_MARGIN_M
+        points, reach = self._world_points(name), np.sqrt(half_x**2 + pad_y**2 + pad_z**2)
+        near = KDTree(points).query_ball_point(candidates.positions, reach)
+        counts = np.zeros(len(candidates), int)
+        for row, (indices, pose) in enumerate(zip(near, candidates.Ts_world_tool, strict=True)):
+            local = np.abs((points[indices] - pose[:3, 3]) @ pose[:3, :3])
+            counts[row] = np.all(local <= (half_x[row], pad_y, pad_z), axis=1).sum()
+        return counts
 
     def _distance(self, name: str, positions: np.ndarray) -> np.ndarray:
         """Return the distances (K,) of positions to an object's surface, metres."""

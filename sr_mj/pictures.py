@@ -1,4 +1,4 @@
-"""Pictures of an attempt: the views, where the cloud fits the instruction, the chosen grasp."""
+"""Pictures of an attempt: the views, where the cloud fits the instruction, the chosen action."""
 
 from pathlib import Path
 
@@ -10,9 +10,10 @@ from models.cameras import CameraPlacement
 from models.gripper_geometry import ROBOTIQ_2F85_CLASS
 from perception.cloud import FeatureCloud
 from perception.views import CameraView, Intrinsics
-from sr_mj.episode import Attempt
+from sr_mj.attempt import Attempt
 
 _BACKGROUND = 250
+_HELD = (255, 140, 0)
 _PANEL_WIDTH = 640
 _CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 _EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1]
@@ -73,8 +74,11 @@ def similarity_overlay(view: CameraView, cloud: FeatureCloud) -> np.ndarray:
     return (0.35 * grey + 0.65 * painted).astype(np.uint8)
 
 
-def grasp_picture(attempt: Attempt) -> np.ndarray:
+def action_picture(attempt: Attempt) -> np.ndarray:
     """Draw the fused cloud with the candidates' tool points and the chosen gripper.
+
+    Where something is to be placed, it is drawn in the gripper, in orange, as it was seen before
+    the grasp.
 
     Args:
         attempt: An attempt with a percept.
@@ -86,8 +90,14 @@ def grasp_picture(attempt: Attempt) -> np.ndarray:
     intrinsics, pose = _intrinsics(_VIRTUAL), _VIRTUAL.T_world_cam_cv()
     canvas = np.full((intrinsics.height, intrinsics.width, 3), _BACKGROUND, np.uint8)
     cloud = attempt.percept.geometry
-    pixels, depth = _project(cloud.points, intrinsics, pose)
-    _splat(canvas, pixels, depth, (cloud.colors * 255).astype(np.uint8), radius=2)
+    points, colors = cloud.points, (cloud.colors * 255).astype(np.uint8)
+    if attempt.held is not None and attempt.plan is not None:
+        R, t = attempt.plan.T_world_tool[:3, :3], attempt.plan.T_world_tool[:3, 3]
+        held = attempt.held.points_tool @ R.T + t
+        points = np.concatenate([points, held])
+        colors = np.concatenate([colors, np.full((len(held), 3), _HELD, np.uint8)])
+    pixels, depth = _project(points, intrinsics, pose)
+    _splat(canvas, pixels, depth, colors, radius=2)
     image = Image.fromarray(canvas)
     draw = ImageDraw.Draw(image)
     if len(attempt.candidates):
@@ -116,15 +126,20 @@ def _side_by_side(pictures: list[np.ndarray]) -> Image.Image:
 def save_pictures(attempt: Attempt, folder: Path) -> None:
     """Write the pictures of an attempt: `attempt_NN_views|similarity|grasp.png`.
 
+    Those of placing are called `place_NN_views|similarity|place.png`, those of a hand-over
+    `hand_over_NN_...`.
+
     Args:
         attempt: The attempt; without a percept only the views are written.
         folder: An existing folder.
     """
-    stem = f"attempt_{attempt.index + 1:02d}"
+    name = "place" if attempt.kind == "place" else "attempt"
+    stem = f"{'hand_over' if attempt.is_hand_over else name}_{attempt.index + 1:02d}"
     _side_by_side([view.rgb for view in attempt.views]).save(folder / f"{stem}_views.png")
     if attempt.percept is None:
         return
     cloud = attempt.percept.features
     overlays = [similarity_overlay(view, cloud) for view in attempt.views]
     _side_by_side(overlays).save(folder / f"{stem}_similarity.png")
-    Image.fromarray(grasp_picture(attempt)).save(folder / f"{stem}_grasp.png")
+    what = "place" if attempt.kind == "place" else "grasp"
+    Image.fromarray(action_picture(attempt)).save(folder / f"{stem}_{what}.png")

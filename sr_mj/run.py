@@ -1,6 +1,7 @@
 """The main command: make a scene, look, decide, act, until the goal is met.
 
     python -m sr_mj.run --scene cluttered15 --goal "give me the banana"
+    python -m sr_mj.run --scene place8 --goal "give me the apple, put it near the bowl"
     python -m sr_mj.run --scene grasp-seen-03
     python -m sr_mj.run --cases testing_cases/
 
@@ -9,7 +10,6 @@ seed on the same machine gives the same account, times aside.
 """
 
 import contextlib
-import json
 import sys
 import time
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ from sr_mj.errors import ConfigError
 
 if TYPE_CHECKING:
     from perception.lifter import MultiViewLifter
-    from sr_mj.episode import Attempt
-    from sr_mj.scene import Scene, SceneConfig
+    from sr_mj.perturbation import PosePerturbation
+    from sr_mj.scene import SceneConfig
 
 MAX_ATTEMPTS = 100
 
@@ -46,17 +46,28 @@ class RunConfig:
     objects: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder of objects made by `python -m models.import_objects`, to use instead of ours."""
     goal: str | None = None
-    """Instruction in free words, such as "give me the banana"; drawn from templates by default."""
+    """Instruction in free words, such as "give me the banana, put it near the bowl"; drawn from
+    templates by default."""
     policy: str = "grounding"
-    """How a grasp is chosen: grounding, random, sr (needs trained weights), or oracle, which reads
-    ground truth and marks the ceiling."""
+    """How a grasp or place is chosen: grounding, random, sr (needs trained weights), or oracle,
+    which reads ground truth and marks the ceiling."""
+    generator: str = "antipodal"
+    """Where grasps come from: antipodal (our sampler), or a learnt generator's file:PATH or
+    http://HOST:PORT/PATH (docs/generators.md)."""
     encoder: str = "embedded"
     """Image and text encoder: embedded (ships with the project), or ViT-L-14, ViT-B-16, ... from
     open_clip, optionally with a tag or file after a colon."""
     checkpoint: Path | None = None
     """Weights for a learnt policy."""
     attempts: int = 8
-    """Grasps that may be tried."""
+    """Grasps that may be tried; placing is tried once."""
+    perturb_cm: float = 0.0
+    """Standard deviation of an error added to the executed position, along each axis."""
+    perturb_deg: float = 0.0
+    """Standard deviation of an error added to the executed orientation, about each axis."""
+    keep_unreachable: bool = False
+    """Leave what the arm cannot reach to the policy, as the paper does: a bad choice then costs an
+    attempt."""
     cameras: str = "sr"
     """Camera preset: sr or a2."""
     out: Path | None = None
@@ -97,69 +108,35 @@ def _scene_configs(config: RunConfig) -> "tuple[SceneConfig, ...]":
         "catalogue": config.objects,
     }
     if config.cases is None:
-        scene = scene_config(config.scene, split=config.split, goal=config.goal, **options)
-        if scene.arranged is not None and scene.arranged.suite == "place":
-            raise ConfigError(
-                f"Arrangement {config.scene!r} asks for placing only, which is not carried out "
-                "yet; choose a grasp or pick-place arrangement, or export this one."
-            )
-        return (scene,)
+        _check_goal(config)
+        return (scene_config(config.scene, split=config.split, goal=config.goal, **options),)
     if config.goal is not None:
         raise ConfigError("Test cases bring their own goals; leave --goal or --cases out.")
     cases = read_cases(config.cases, open_catalogue(config.objects), split=config.split)
     return tuple(SceneConfig(arrangement=case, **options) for case in cases)
 
 
-class _Reporter:
-    """Prints the account as it happens and keeps it in the output folder."""
+def _check_goal(config: RunConfig) -> None:
+    """Refuse a goal that only says where to place, in a scene where "it" is nothing in particular.
 
-    def __init__(self, config: RunConfig, scene: "Scene", out: Path | None) -> None:
-        self._config, self._scene, self._out = config, scene, out
-        self.attempts: list[Attempt] = []
+    Arrangements say what "it" is.
+    """
+    from sr_mj.instruction import names_target
+    from sr_mj.scene import SCENE_KINDS
 
-    def begin(self) -> None:
-        from sr_mj.account import describe_scene
-        from sr_mj.provenance import git_revision, package_versions, to_json
+    goal = (config.goal or "").strip()
+    if goal and config.scene in SCENE_KINDS and not names_target(goal):
+        raise ConfigError(
+            f"The goal {goal!r} does not say what to pick; say it first, as in "
+            f"'give me the apple, {goal}', or choose a place arrangement."
+        )
 
-        config = self._config
-        if self._out is not None:
-            self._out.mkdir(parents=True, exist_ok=True)
-            about = {
-                "config": config,
-                "goal": self._scene.goal.text,
-                "git_revision": git_revision(),
-                "versions": package_versions(),
-            }
-            (self._out / "run.json").write_text(to_json(about))
-        if not config.json:
-            print(describe_scene(self._scene))
-            note = " (reads ground truth)" if config.policy == "oracle" else ""
-            print(f"Policy {config.policy}{note}, encoder {config.encoder}", flush=True)
 
-    def add(self, attempt: "Attempt") -> None:
-        from sr_mj.account import attempt_record, describe_attempt
-        from sr_mj.pictures import save_pictures
+def _perturbation(config: RunConfig) -> "PosePerturbation | None":
+    from sr_mj.perturbation import PosePerturbation
 
-        self.attempts.append(attempt)
-        if not self._config.json:
-            print(describe_attempt(attempt, verbose=self._config.verbose), flush=True)
-        if self._out is not None:
-            with (self._out / "attempts.jsonl").open("a") as file:
-                file.write(json.dumps(attempt_record(attempt)) + "\n")
-            save_pictures(attempt, self._out)
-
-    def finish(self, seconds: float) -> None:
-        from sr_mj.account import describe_result, episode_record
-
-        record: dict[str, Any] = episode_record(self._scene, self.attempts, self._config.attempts)
-        record["seconds"] = round(seconds, 2)
-        if self._out is not None:
-            (self._out / "result.json").write_text(json.dumps(record, indent=2) + "\n")
-        if self._config.json:
-            print(json.dumps(record))
-        else:
-            result = describe_result(self._scene, self.attempts, self._config.attempts)
-            print(f"{result} [{seconds:.1f} s]")
+    perturbation = PosePerturbation(sigma_m=config.perturb_cm / 100, sigma_deg=config.perturb_deg)
+    return perturbation if config.perturb_cm or config.perturb_deg else None
 
 
 def run(config: RunConfig) -> int:
@@ -169,7 +146,7 @@ def run(config: RunConfig) -> int:
         config: Options.
 
     Returns:
-        Exit status 0: a failed grasp is a result, not an error.
+        Exit status 0: a failure in the world is a result, not an error.
     """
     _check(config)
     start = time.perf_counter()
@@ -178,11 +155,14 @@ def run(config: RunConfig) -> int:
     # Before anything imports dm_control, which binds OpenGL to one library for good.
     select_backend()
     from sr_mj.assemble import check_policy_name, lifter_for
+    from sr_mj.candidates.external import check_generator_name
     from sr_mj.video import check_video_path
 
     # Mistakes first: nothing is made before every name is known to exist.
     scenes = _scene_configs(config)
+    _perturbation(config)
     check_policy_name(config.policy)
+    check_generator_name(config.generator)
     if config.record is not None:
         check_video_path(config.record)
     lifter = lifter_for(
@@ -202,28 +182,39 @@ def _run_episode(
 ) -> bool:
     """Run one episode, report it, and say whether it succeeded."""
     from sr_mj.assemble import assembled, make_policy
-    from sr_mj.episode import run_episode
+    from sr_mj.candidates.external import load_generator
+    from sr_mj.episode import has_succeeded, run_episode
+    from sr_mj.reporting import Reporter
     from sr_mj.scene import make_scene
     from sr_mj.video import VideoRecorder
 
     start = time.perf_counter()
+    generator = load_generator(config.generator)
     scene = make_scene(scene_config)
     policy = make_policy(config.policy, scene, config.checkpoint)
     out, record = config.out, config.record
     if is_one_of_many:
         out = out and out / scene_config.title
         record = record and record.with_stem(f"{record.stem}-{scene_config.title}")
-    reporter = _Reporter(config, scene, out)
+    reporter = Reporter(config, scene, out)
     reporter.begin()
     with contextlib.ExitStack() as stack:
         film = record and stack.enter_context(VideoRecorder(scene, record))
         pipeline = stack.enter_context(
-            assembled(scene, lifter=lifter, policy=policy, on_step=film or None)
+            assembled(
+                scene,
+                lifter=lifter,
+                policy=policy,
+                generator=generator,
+                on_step=film or None,
+                perturbation=_perturbation(config),
+                keep_unreachable=config.keep_unreachable,
+            )
         )
         for attempt in run_episode(scene, pipeline, seed=config.seed, max_attempts=config.attempts):
             reporter.add(attempt)
     reporter.finish(time.perf_counter() - start)
-    return bool(reporter.attempts and reporter.attempts[-1].outcome.success)
+    return has_succeeded(scene, reporter.attempts)
 
 
 def main() -> None:

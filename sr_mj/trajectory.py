@@ -3,15 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
 
 from models.ur5 import MAX_JOINT_SPEED
 from sr_mj.errors import ConfigError
 
-# The quintic s(u) = 10u^3 - 15u^4 + 6u^5 starts and ends at rest; over its unit time its speed
-# peaks at 1.875 and its acceleration at 10/sqrt(3).
-_PEAK_SPEED = 1.875
-_PEAK_ACCELERATION = 10 / np.sqrt(3)
+# Sampling of the time law, and the span over which the acceleration's steps are smeared.
+_SAMPLE_S, _SMOOTH_S = 0.004, 0.08
+_GRID_A_WAYPOINT, _LEAST_GRID, _LARGEST_GRID = 12, 60, 240
+# Between the samples the limits could be exceeded by less than this.
+_RESERVE = 1.002
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +25,7 @@ class MotionLimits:
             the UR5; 8 is our assumption, well under what the joints' torque allows.
     """
 
-    speed: float = 0.7 * MAX_JOINT_SPEED
+    speed: float = 0.9 * MAX_JOINT_SPEED
     acceleration: float = 8.0
 
     def __post_init__(self) -> None:
@@ -50,10 +51,12 @@ class Trajectory:
 
     Attributes:
         path: Cubic spline over the path parameter 0..1 -> (6,) joint angles, rad.
+        law: Path parameter over time, seconds; it rises from 0 to 1 and is at rest at both ends.
         duration_s: Time it takes, seconds.
     """
 
     path: PPoly
+    law: PPoly
     duration_s: float
 
     @property
@@ -75,14 +78,16 @@ class Trajectory:
         Returns:
             Joint angles (T, 6) in rad and joint velocities (T, 6) in rad/s.
         """
-        u = np.clip(np.asarray(times, float) / max(self.duration_s, 1e-9), 0, 1)
-        s = u**3 * (10 - 15 * u + 6 * u**2)
-        ds = 30 * u**2 * (1 - u) ** 2 / max(self.duration_s, 1e-9)
-        return self.path(s), self.path(s, 1) * ds[:, None]
+        times = np.clip(np.asarray(times, float), 0, self.duration_s)
+        s = np.clip(self.law(times), 0, 1)
+        return self.path(s), self.path(s, 1) * self.law(times, 1)[:, None]
 
 
 def time_waypoints(waypoints: np.ndarray, limits: MotionLimits) -> Trajectory:
     """Fit a smooth path through joint waypoints and time it within the limits.
+
+    Along the path the motion is as fast as the limits allow everywhere, with the steps of its
+    acceleration smeared over 80 ms.
 
     Args:
         waypoints: (W, 6) joint angles, rad; W >= 2.
@@ -97,20 +102,82 @@ def time_waypoints(waypoints: np.ndarray, limits: MotionLimits) -> Trajectory:
     waypoints = np.asarray(waypoints, float)
     if waypoints.ndim != 2 or len(waypoints) < 2:
         raise ConfigError(f"Waypoints have shape {waypoints.shape}; expected (W, 6) with W >= 2.")
+    path = fit_path(waypoints)
+    if np.abs(waypoints - waypoints[0]).max() < 1e-9:
+        still = CubicHermiteSpline([0.0, 1.0], [0.0, 0.0], [0.0, 0.0])
+        return Trajectory(path=path, law=still, duration_s=0.0)
+    num = int(np.clip(_GRID_A_WAYPOINT * len(waypoints), _LEAST_GRID, _LARGEST_GRID)) + 1
+    times, speed = _fastest(path, np.linspace(0, 1, num), limits)
+    law = _smoothed_law(times, speed)
+    duration = float(law.x[-1])
+    stretch = float(_RESERVE * _excess(path, law, limits))
+    law = PPoly(law.c / stretch ** np.arange(3, -1, -1)[:, None], law.x * stretch)
+    return Trajectory(path=path, law=law, duration_s=duration * stretch)
+
+
+def fit_path(waypoints: np.ndarray) -> PPoly:
+    """Fit a cubic spline through waypoints (W, 6), over 0..1 by their distance from each other."""
     steps = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
-    keep = np.r_[True, steps > 1e-9]
-    waypoints, steps = waypoints[keep], steps[steps > 1e-9]
+    waypoints, steps = waypoints[np.r_[True, steps > 1e-9]], steps[steps > 1e-9]
     if len(waypoints) == 1:
         waypoints, steps = np.repeat(waypoints, 2, axis=0), np.ones(1)
     knots = np.r_[0, np.cumsum(steps)] / steps.sum()
     knots[-1] = 1.0
-    path = CubicSpline(knots, waypoints, bc_type="natural")
-    grid = np.linspace(0, 1, 20 * len(waypoints) + 1)
-    slope = np.abs(path(grid, 1)).max()
-    curvature = np.abs(path(grid, 2)).max()
-    # q'' = path'' ds^2 + path' dds: each factor is bounded by its peak, so the sum is too.
-    duration = max(
-        _PEAK_SPEED * slope / limits.speed,
-        np.sqrt((_PEAK_ACCELERATION * slope + _PEAK_SPEED**2 * curvature) / limits.acceleration),
+    return CubicSpline(knots, waypoints, bc_type="natural")
+
+
+def _fastest(path: PPoly, grid: np.ndarray, limits: MotionLimits) -> tuple[np.ndarray, np.ndarray]:
+    """Find the greatest speed along the path; times and path speeds (G,) at the grid's points.
+
+    The squared speed x is bounded by both limits where the path bends, and may rise and fall only
+    as the acceleration limit leaves room for: q'' = path'' x + path' x'/2.
+    """
+    slope, bend = np.abs(path(grid, 1)), np.abs(path(grid, 2))
+    slope = np.maximum(slope, 1e-9)
+    highest = np.minimum(
+        ((limits.speed / slope) ** 2).min(axis=1),
+        (limits.acceleration / np.maximum(bend, 1e-9)).min(axis=1),
     )
-    return Trajectory(path=path, duration_s=float(duration))
+    highest[[0, -1]] = 0
+    step = grid[1] - grid[0]
+    squared = highest
+    for direction in (1, -1):
+        squared = _limit_rise(
+            squared[::direction], slope[::direction], bend[::direction], limits, step
+        )[::direction]
+    speed = np.sqrt(squared)
+    return np.r_[0, np.cumsum(2 * step / (speed[:-1] + speed[1:]))], speed
+
+
+def _limit_rise(
+    squared: np.ndarray, slope: np.ndarray, bend: np.ndarray, limits: MotionLimits, step: float
+) -> np.ndarray:
+    """Lower squared path speeds (G,) until none rises faster than the acceleration allows."""
+    squared = squared.copy()
+    room, loss = limits.acceleration / slope, bend / slope
+    for i in range(len(squared) - 1):
+        rise = max((room[i] - loss[i] * squared[i]).min(), 0.0)
+        squared[i + 1] = min(squared[i + 1], squared[i] + 2 * step * rise)
+    return squared
+
+
+def _smoothed_law(times: np.ndarray, speed: np.ndarray) -> PPoly:
+    """Smear a speed profile over a short span and integrate it to a law from 0 to 1."""
+    samples = np.arange(0, times[-1] + _SAMPLE_S, _SAMPLE_S)
+    width = round(_SMOOTH_S / _SAMPLE_S)
+    profile = np.interp(samples, times, speed, right=0.0)
+    profile = np.r_[0, np.convolve(profile, np.full(width, 1 / width)), 0]
+    travelled = np.r_[0, np.cumsum((profile[1:] + profile[:-1]) * _SAMPLE_S / 2)]
+    scale = 1 / travelled[-1]
+    clock = np.arange(len(profile)) * _SAMPLE_S
+    return CubicHermiteSpline(clock, travelled * scale, profile * scale)
+
+
+def _excess(path: PPoly, law: PPoly, limits: MotionLimits) -> float:
+    """Factor by which the law must be stretched to keep the limits; below 1 it has reserves."""
+    times = np.linspace(0, law.x[-1], 4 * len(law.x))
+    s = np.clip(law(times), 0, 1)
+    rate, slope = law(times, 1)[:, None], path(s, 1)
+    speed = np.abs(slope * rate).max()
+    acceleration = np.abs(path(s, 2) * rate**2 + slope * law(times, 2)[:, None]).max()
+    return max(speed / limits.speed, np.sqrt(acceleration / limits.acceleration))

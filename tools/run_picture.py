@@ -1,9 +1,10 @@
 """Make the README's picture from a run of the main command.
 
     python -m tools.run_picture --seed 0 --out docs/run.png
+    python -m tools.run_picture --scene place8 --goal "give me the apple, put it near the bowl"
 
-Top: a frame of the video, and the cloud with the grasps of the last attempt; below: where the cloud
-fits the sentence, in the three views.
+Top: a frame of the video, and the cloud with the grasps or places of the last attempt; below: where
+the cloud fits what was looked for, in the three views.
 """
 
 import subprocess
@@ -26,8 +27,14 @@ _COLOR_STEP = 5
 class PictureConfig:
     """Options of `python -m tools.run_picture`."""
 
+    scene: str = "cluttered15"
+    """Kind of scene, or arrangement."""
+    goal: str | None = None
+    """Instruction; drawn by default."""
+    policy: str = "grounding"
+    """How grasp or place is chosen."""
     seed: int = 0
-    """Seed of the run, on `cluttered15`."""
+    """Seed of the run."""
     moment: float = 0.75
     """Share of the video after which the frame is taken."""
     out: Path = Path("docs/run.png")
@@ -49,12 +56,13 @@ def compose(folder: Path, video: Path, moment: float) -> Image.Image:
 
     frames = imageio.imread(video)
     frame = Image.fromarray(frames[int(moment * (len(frames) - 1))])
-    grasp = Image.open(sorted(folder.glob("attempt_*_grasp.png"))[-1])
-    overlay = Image.open(sorted(folder.glob("attempt_*_similarity.png"))[-1])
+    # In the order of their names, what was placed comes after what was picked.
+    action = Image.open(sorted([*folder.glob("*_grasp.png"), *folder.glob("*_place.png")])[-1])
+    overlay = Image.open(sorted(folder.glob("*_similarity.png"))[-1])
     overlay = overlay.resize((_WIDTH_PX, round(overlay.height * _WIDTH_PX / overlay.width)))
     picture = Image.new("RGB", (_WIDTH_PX, _TOP_PX + overlay.height))
     picture.paste(_cover(frame, _FRAME_PX, _TOP_PX), (0, 0))
-    picture.paste(_cover(grasp, _WIDTH_PX - _FRAME_PX, _TOP_PX), (_FRAME_PX, 0))
+    picture.paste(_cover(action, _WIDTH_PX - _FRAME_PX, _TOP_PX), (_FRAME_PX, 0))
     picture.paste(overlay, (0, _TOP_PX))
     return picture
 
@@ -63,7 +71,9 @@ def main(config: PictureConfig) -> None:
     """Run an episode, print its account, save the picture."""
     with tempfile.TemporaryDirectory() as scratch:
         folder, video = Path(scratch) / "run", Path(scratch) / "run.mp4"
-        arguments = ["--seed", str(config.seed), "--out", str(folder), "--record", str(video)]
+        arguments = ["--scene", config.scene, "--policy", config.policy]
+        arguments += ["--seed", str(config.seed), "--out", str(folder), "--record", str(video)]
+        arguments += [] if config.goal is None else ["--goal", config.goal]
         subprocess.run([sys.executable, "-m", "sr_mj.run", *arguments], check=True)
         picture = compose(folder, video, config.moment)
     levels = np.rint(np.asarray(picture, float) / _COLOR_STEP) * _COLOR_STEP

@@ -13,15 +13,12 @@ from policy.actions import ActionCandidates
 from sr_mj.candidates.collision import hits_points, swept_boxes, table_clearance
 from sr_mj.candidates.config import AntipodalConfig, Relaxation
 from sr_mj.candidates.contacts import Contacts, find_contacts
-from sr_mj.candidates.frames import seed_frames
-from sr_mj.candidates.neighbourhoods import Neighbourhoods, gather_neighbours
+from sr_mj.candidates.frames import choose_orientations
 from sr_mj.candidates.ranking import best_per_group, grasp_prior, select_spread
 from sr_mj.candidates.strips import FingerPlacements, depth_hypotheses, place_fingers, scan_strips
 from sr_mj.candidates.surface import ObjectSurface, choose_seeds, extract_surface, thin
 from sr_mj.candidates.threads import single_threaded
 
-# A strip reaches 70 mm to either side of its seed, contacts and their balance 55 mm.
-_STRIP_RADIUS_M, _CONTACT_RADIUS_M = 0.07, 0.055
 _COARSE_M = 0.009
 # Rounding of the fingertips' height over the table.
 _ROUNDING_M = 1e-4
@@ -35,7 +32,6 @@ class _Search:
 
     surface: ObjectSurface
     origins: np.ndarray
-    around: Neighbourhoods
     placements: FingerPlacements
 
 
@@ -93,25 +89,26 @@ class AntipodalSampler:
 
     def _search(self, surface: ObjectSurface, seeds: np.ndarray) -> _Search:
         """Find all places around the seeds where an object fits between the fingers."""
+        config = self.config
         origins = surface.points[seeds]
-        coarse = thin(surface.obstacles, self.config.scan_voxel_m)
-        around = gather_neighbours(coarse, origins, _STRIP_RADIUS_M)
-        rotations, valid = seed_frames(surface.normals[seeds], around.offsets, self.config)
-        seed, orientation, profiles = scan_strips(around, rotations, valid)
-        rotation = rotations[seed, orientation]
-        row, depth_m = depth_hypotheses(origins[seed, 2], rotation, self.config)
+        pairs = choose_orientations(surface.points, surface.normals, seeds, config)
+        coarse = thin(surface.obstacles, config.scan_voxel_m)
+        profiles, shift_m = scan_strips(coarse, origins, pairs)
+        seed, rotation = pairs.seed, pairs.rotations[pairs.orientation]
+        row, depth_m = depth_hypotheses(origins[seed, 2], rotation, config)
         return _Search(
             surface=surface,
             origins=origins,
-            around=gather_neighbours(surface.points, origins, _CONTACT_RADIUS_M),
-            placements=place_fingers(seed[row], rotation[row], depth_m, profiles[row], self.config),
+            placements=place_fingers(
+                seed[row], rotation[row], depth_m, profiles[row], shift_m[row], config
+            ),
         )
 
     def _finish(self, search: _Search, limits: Relaxation) -> ActionCandidates:
         """Reduce placements to candidates under the thresholds of one pass."""
         config = self.config
         placements = self._promising(search.placements, limits)
-        contacts = find_contacts(placements, search.around, search.surface.normals, config)
+        contacts = find_contacts(placements, search.origins, search.surface, config)
         poses = self._tool_poses(search.origins, placements, contacts)
         prior = grasp_prior(contacts, placements.engagement_m, poses[:, 2, 2])
         low, high = swept_boxes(self.approach_opening(contacts.width_m), config)

@@ -1,12 +1,12 @@
 """Collision of the open gripper, swept along its approach, with the cloud and the table."""
 
 import numpy as np
-import torch
 
+from sr_mj.candidates.columns import points_in_boxes, sort_into_columns, world_bounds
 from sr_mj.candidates.config import AntipodalConfig
 
-_ROWS_A_CHUNK = 32
-_CELL_M = 0.05
+_NUM_LEVELS = 5
+_COLUMN_M = 0.012
 
 
 def swept_boxes(opening_m: np.ndarray, config: AntipodalConfig) -> tuple[np.ndarray, np.ndarray]:
@@ -66,40 +66,19 @@ def hits_points(
         (K,) mask of the poses at which a box holds a point.
     """
     hits = np.zeros(len(Ts_world_tool), bool)
-    # Poses that stand together share a chunk, and only the points around them are looked at.
-    order = np.lexsort(np.floor(Ts_world_tool[:, :2, 3].T / _CELL_M))
-    for start in range(0, len(hits), _ROWS_A_CHUNK):
-        rows = order[start : start + _ROWS_A_CHUNK]
-        poses, lower, upper = Ts_world_tool[rows], low[rows], high[rows]
-        nearby = points[_is_within_bounds(points, poses, lower, upper)]
-        axes = poses[:, :3, :3].transpose(0, 2, 1)
-        shift = torch.from_numpy(np.einsum("kij,kj->ki", axes, poses[:, :3, 3]))
-        # In double precision: BLAS rounds differently from call to call, and a point on the border
-        # of a box in single precision would then be in or out by chance.
-        local = torch.from_numpy(axes.reshape(-1, 3)) @ torch.from_numpy(nearby.T.astype(float))
-        local = (local.view(len(rows), 3, -1) - shift[..., None]).float()
-        hits[rows] = _any_inside(local, torch.from_numpy(lower), torch.from_numpy(upper)).numpy()
-    return hits
-
-
-def _is_within_bounds(
-    points: np.ndarray, poses: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
-    """Mask of the points inside the common axis-aligned world bounds of all boxes."""
-    rotation, position = poses[:, :3, :3], poses[:, None, :3, 3]
-    center = np.einsum("kij,kbj->kbi", rotation, (low + high) / 2) + position
-    reach = np.einsum("kij,kbj->kbi", np.abs(rotation), (high - low) / 2)
-    lower, upper = (center - reach).min(axis=(0, 1)), (center + reach).max(axis=(0, 1))
-    return ((points >= lower) & (points <= upper)).all(axis=1)
-
-
-def _any_inside(local: torch.Tensor, low: torch.Tensor, high: torch.Tensor) -> torch.Tensor:
-    """Mask (k,) of rows of points (k, 3, n) of which one lies in a box (k, b, 3)."""
-    hit = torch.zeros(len(local), dtype=torch.bool)
+    if not len(points):
+        return hits
+    # Most palms are above most points: boxes are tested only against what is as high as they.
+    levels = np.linspace(points[:, 2].min(), points[:, 2].max(), _NUM_LEVELS)
+    above = [points[points[:, 2] >= level] for level in levels]
+    columns = [sort_into_columns(part, _COLUMN_M) for part in above]
     for box in range(low.shape[1]):
-        inside = torch.ones_like(local[:, 0], dtype=torch.bool)
-        for axis in range(3):
-            inside &= local[:, axis] > low[:, box, axis, None]
-            inside &= local[:, axis] < high[:, box, axis, None]
-        hit |= inside.any(dim=1)
-    return hit
+        lowest = world_bounds(Ts_world_tool, low[:, box], high[:, box])[0][:, 2]
+        level_of = (np.searchsorted(levels, lowest, side="right") - 1).clip(0)
+        # A pose that one box has decided needs no other.
+        is_open = ~hits & (lowest <= levels[-1])
+        for level in range(_NUM_LEVELS):
+            rows = np.flatnonzero(is_open & (level_of == level))
+            boxes = Ts_world_tool[rows], low[rows, box], high[rows, box]
+            hits[rows[points_in_boxes(above[level], columns[level], *boxes)[0]]] = True
+    return hits

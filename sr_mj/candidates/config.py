@@ -11,7 +11,8 @@ _POSITIVE = (
 )  # fmt: skip
 _NOT_NEGATIVE = ("extra_opening_m", "min_tip_height_m")
 _COUNTS = (
-    "max_seeds", "num_rolls", "max_placements", "max_survivors", "max_candidates", "max_per_cell",
+    "max_seeds", "num_azimuths", "num_rolls", "max_placements", "max_survivors", "max_candidates",
+    "max_per_cell",
 )  # fmt: skip
 _LARGEST_TILT_DEG = 75.0
 _LEAST_CLEARANCE_M = -0.005
@@ -70,10 +71,11 @@ class AntipodalConfig:
             that a tilted approach does not enter an object through a side that no camera saw.
         seed_spacing_m: Spacing of the surface points from which grasps start: half a pad.
         max_seeds: Most seeds; bounds the run time.
-        num_rolls: Closing directions a seed and tilt, spread over half a turn from the
-            direction that the surface suggests.
-        tilts_deg: Approach angles from the vertical, about the closing direction. Approaches
-            along the surface normal come on top.
+        num_azimuths: Closing directions, spread evenly over half a turn, that all seeds share:
+            the strips under all of them are measured at once.
+        num_rolls: Closing directions a seed and tilt, out of these, spread over half a turn from
+            the one that the surface suggests.
+        tilts_deg: Approach angles from the vertical, about the closing direction.
         depths_m: How far beyond the seed the fingertips go, along the approach, ascending.
         min_alignment: Least mean cosine between the closing direction and the contact normals,
             on both sides. 0.4 is loose: normals are blurred by noise and unseen sides are judged
@@ -112,6 +114,7 @@ class AntipodalConfig:
     wall_step_m: float = 0.005
     seed_spacing_m: float = 0.011
     max_seeds: int = 450
+    num_azimuths: int = 24
     num_rolls: int = 6
     tilts_deg: tuple[float, ...] = (0.0, 25.0, -25.0, 50.0, -50.0)
     depths_m: tuple[float, ...] = (0.006, 0.013, 0.022, 0.032)

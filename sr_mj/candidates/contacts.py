@@ -1,14 +1,14 @@
 """Contact patches between the closing fingers, from observed points and normals."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import torch
 
+from sr_mj.candidates.columns import points_in_boxes, sort_into_columns
 from sr_mj.candidates.config import AntipodalConfig
-from sr_mj.candidates.neighbourhoods import Neighbourhoods, exact_axes
 from sr_mj.candidates.strips import OUTWARD, FingerPlacements
+from sr_mj.candidates.surface import ObjectSurface, thin
 
 # Points this close to the outermost one make a contact patch; a soft pad and the noise of the
 # cloud are of this order.
@@ -17,8 +17,9 @@ _EDGE_MARGIN_M = 0.003
 _MIN_POINTS = 4
 # A flank known only by its outline counts a little less than one that was seen.
 _OUTLINE_TRUST = 0.9
-_BALANCE_HALF_M = 0.05
-_ROWS_A_CHUNK = 128
+# The balance of what is between the fingers is that of coarser points, further to their sides.
+_BALANCE_HALF_M, _BALANCE_HEIGHT_M, _BALANCE_VOXEL_M = 0.05, 0.06, 0.008
+_COLUMN_M = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,73 +44,40 @@ class Contacts:
 
 
 class _Between(NamedTuple):
-    """Points that the closing fingers may reach, one row a pair of placement and point."""
+    """Points between fingers: placement, point, and tool coordinates from the seed, (P,) each."""
 
     row: np.ndarray
+    point: np.ndarray
     x: np.ndarray
     y: np.ndarray
-    height: np.ndarray
-    normal: np.ndarray
 
 
 def find_contacts(
     placements: FingerPlacements,
-    around: Neighbourhoods,
-    normals: np.ndarray,
+    origins: np.ndarray,
+    surface: ObjectSurface,
     config: AntipodalConfig,
 ) -> Contacts:
     """Measure the contact patches of finger placements.
 
     Args:
         placements: H finger placements.
-        around: Observed points around the seeds.
-        normals: (N, 3) unit normals of the observed points.
+        origins: (S, 3) positions of the seeds.
+        surface: Observed points and normals.
         config: The sampler's settings.
 
     Returns:
         The contacts of the H placements.
     """
-    chunks = []
-    for start in range(0, max(len(placements.seed), 1), _ROWS_A_CHUNK):
-        part = placements.take(slice(start, start + _ROWS_A_CHUNK))
-        chunks.append(_measure(part, _points_between(part, around, normals), config))
-    return Contacts(
-        **{
-            field.name: np.concatenate([getattr(chunk, field.name) for chunk in chunks])
-            for field in fields(Contacts)
-        }
-    )
-
-
-def _points_between(
-    placements: FingerPlacements, around: Neighbourhoods, normals: np.ndarray
-) -> _Between:
-    """Express the points between the fingers in tool axes: x from the middle, height over tips."""
-    size = around.count[placements.seed].max(initial=0)
-    offsets = torch.from_numpy(around.offsets[placements.seed, :size])
-    local = torch.bmm(offsets, exact_axes(placements.rotation))
-    x = local[..., 0] - torch.from_numpy(placements.center_m)[:, None]
-    reach = torch.from_numpy(placements.width_m / 2 + _EDGE_MARGIN_M)[:, None]
-    height = torch.from_numpy(placements.depth_m)[:, None] - local[..., 2]
-    inside = (x.abs() < reach) & (height > 0) & (local[..., 1].abs() < _BALANCE_HALF_M)
-    row, place = torch.nonzero(inside, as_tuple=True)
-    point = around.index[placements.seed[row.numpy()], place.numpy()]
-    return _Between(
-        row=row.numpy(),
-        x=x[row, place].numpy(),
-        y=local[row, place, 1].numpy(),
-        height=height[row, place].numpy(),
-        normal=np.einsum("pi,pij->pj", normals[point], placements.rotation[row.numpy()]),
-    )
-
-
-def _measure(placements: FingerPlacements, between: _Between, config: AntipodalConfig) -> Contacts:
     count = len(placements.seed)
+    poses = np.zeros((count, 4, 4))
+    poses[:, :3, :3], poses[:, :3, 3] = placements.rotation, origins[placements.seed]
     half_y, half_z = config.gripper.pad_half_m
-    is_pinched = (np.abs(between.y) < half_y) & (between.height < 2 * half_z)
-    row, x, normal = between.row[is_pinched], between.x[is_pinched], between.normal[is_pinched]
-    low, high = _extent(row, x, placements.width_m)
+    pinched = _points_between(placements, poses, surface.points, (half_y, 2 * half_z))
+    row, x = pinched.row, pinched.x - placements.center_m[pinched.row]
+    normal = np.einsum("pi,pij->pj", surface.normals[pinched.point], placements.rotation[row])
 
+    low, high = _extent(row, x, placements.width_m)
     patches = (x < low[row] + _PATCH_M, x > high[row] - _PATCH_M)
     sizes = np.stack([np.bincount(row[patch], minlength=count) for patch in patches], axis=1)
     mean = np.stack([_row_means(row, axis, patches, sizes) for axis in normal.T], axis=-1)
@@ -123,17 +91,45 @@ def _measure(placements: FingerPlacements, between: _Between, config: AntipodalC
     faces = _row_means(row, x, patches, sizes)
     low = np.where(is_seen[:, 0], faces[:, 0], low)
     high = np.where(is_seen[:, 1], faces[:, 1], high)
-
-    total = np.bincount(between.row, minlength=count)
-    offset = np.bincount(between.row, between.y, count) / np.maximum(total, 1)
     return Contacts(
         center_m=placements.center_m + (low + high) / 2,
         width_m=high - low,
         alignment=np.where(is_seen, seen, outlined),
         opposition=(flanks[:, 0] * flanks[:, 1]).sum(axis=1),
         area=np.minimum(sizes.min(axis=1) * config.voxel_m**2 / (4 * half_y * half_z), 1.0),
-        offset_m=np.abs(offset),
+        offset_m=_imbalance(placements, poses, surface.points),
     )
+
+
+def _points_between(
+    placements: FingerPlacements,
+    poses: np.ndarray,
+    points: np.ndarray,
+    reach_m: tuple[float, float],
+) -> _Between:
+    """Find the points between the fingers, `reach_m` to either side and above the fingertips."""
+    half_x = placements.width_m / 2 + _EDGE_MARGIN_M
+    half_y = np.full_like(half_x, reach_m[0])
+    low = [placements.center_m - half_x, -half_y, placements.depth_m - reach_m[1]]
+    high = [placements.center_m + half_x, half_y, placements.depth_m]
+    low, high = np.stack(low, axis=1), np.stack(high, axis=1)
+    columns = sort_into_columns(points, _COLUMN_M)
+    row, point = points_in_boxes(points, columns, poses, low, high)
+    x, y, z = (points[:, axis][point] - poses[:, axis, 3][row] for axis in range(3))
+    local = [
+        x * poses[:, 0, axis][row] + y * poses[:, 1, axis][row] + z * poses[:, 2, axis][row]
+        for axis in (0, 1)
+    ]
+    return _Between(row=row, point=point, x=local[0], y=local[1])
+
+
+def _imbalance(placements: FingerPlacements, poses: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Distance (H,) of the fingers from the middle of what is between them, along the pads."""
+    coarse = thin(points, _BALANCE_VOXEL_M)
+    between = _points_between(placements, poses, coarse, (_BALANCE_HALF_M, _BALANCE_HEIGHT_M))
+    total = np.bincount(between.row, minlength=len(poses))
+    offset = np.bincount(between.row, between.y, len(poses))
+    return np.abs(offset / np.maximum(total, 1))
 
 
 def _extent(row: np.ndarray, x: np.ndarray, width_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

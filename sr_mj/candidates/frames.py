@@ -1,7 +1,10 @@
-"""Orientations of the gripper worth trying at a seed."""
+"""Orientations of the gripper worth trying at a seed, out of a fixed set that all seeds share."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
+from sr_mj.candidates.columns import sort_into_columns
 from sr_mj.candidates.config import AntipodalConfig
 
 # Below this share of the normal that is horizontal the surface says nothing about the closing
@@ -10,60 +13,87 @@ _MIN_HORIZONTAL = 0.35
 _OUTLINE_RADIUS_M, _OUTLINE_HEIGHT_M = 0.03, 0.012
 # A finger may come a little from behind the seed's surface: normals are noisy at edges.
 _MAX_FROM_BEHIND = 0.3
-_NORMAL_APPROACH_DEG = (12.0, 62.0)
 
 
-def seed_frames(
-    normals: np.ndarray, offsets: np.ndarray, config: AntipodalConfig
-) -> tuple[np.ndarray, np.ndarray]:
-    """Propose orientations for every seed.
+@dataclass(frozen=True, kw_only=True)
+class Hypotheses:
+    """Seeds paired with orientations. Arrays have H rows but for the last.
+
+    Attributes:
+        seed: int64 index of the seed.
+        orientation: int64 index of the orientation.
+        rotations: (O, 3, 3) float32 set of orientations, tool to world.
+    """
+
+    seed: np.ndarray
+    orientation: np.ndarray
+    rotations: np.ndarray
+
+
+def gripper_orientations(config: AntipodalConfig) -> np.ndarray:
+    """List the orientations, evenly spread closing directions for every tilt.
 
     Args:
-        normals: (S, 3) unit normals at the seeds.
-        offsets: (S, M, 3) neighbouring points relative to their seed, metres; unused places hold
-            coordinates far away.
         config: The sampler's settings.
 
     Returns:
-        Rotations (S, O, 3, 3) that map tool to world coordinates, and a mask (S, O) of those that
-        make sense at their seed.
+        (T * A, 3, 3) float32 rotations, tool to world: tilts first, then azimuths over half a
+        turn. The set turned by half a turn about the vertical is the set itself if the tilts come
+        in pairs, because the gripper is symmetric.
     """
-    rolls = np.arange(config.num_rolls) * np.pi / config.num_rolls
-    azimuth = _base_azimuth(normals, offsets)[:, None] + rolls
+    azimuth = np.arange(config.num_azimuths) * (np.pi / config.num_azimuths)
     closing = np.stack([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)], axis=-1)
     down = np.broadcast_to([0.0, 0.0, -1.0], closing.shape)
     side = np.cross(down, closing)
-    groups = [
-        _frame(closing, np.cos(tilt) * down - np.sin(tilt) * side)
-        for tilt in np.radians(config.tilts_deg)
-    ]
-    inward = np.broadcast_to(-normals[:, None], closing.shape)
-    groups.append(_frame(closing, inward))
-    rotations = np.concatenate(groups, axis=1)
-
-    from_behind = np.einsum("soi,si->so", rotations[..., 2], normals)
-    valid = from_behind < _MAX_FROM_BEHIND
-    low, high = np.cos(np.radians(_NORMAL_APPROACH_DEG))
-    is_tilted = (normals[:, 2] < low) & (normals[:, 2] > high)
-    valid[:, -config.num_rolls :] &= is_tilted[:, None]
-    return rotations.astype(np.float32), valid
+    frames = []
+    for tilt in np.radians(config.tilts_deg):
+        approach = np.cos(tilt) * down - np.sin(tilt) * side
+        frames.append(np.stack([closing, np.cross(approach, closing), approach], axis=-1))
+    return np.concatenate(frames).astype(np.float32)
 
 
-def _frame(closing: np.ndarray, approach: np.ndarray) -> np.ndarray:
-    """Complete (..., 3, 3) frames; the closing direction is made orthogonal to the approach."""
-    closing = closing - (closing * approach).sum(-1, keepdims=True) * approach
-    closing = closing / np.maximum(np.linalg.norm(closing, axis=-1, keepdims=True), 1e-6)
-    return np.stack([closing, np.cross(approach, closing), approach], axis=-1)
+def choose_orientations(
+    points: np.ndarray, normals: np.ndarray, seeds: np.ndarray, config: AntipodalConfig
+) -> Hypotheses:
+    """Pair every seed with the orientations that make sense there.
+
+    Args:
+        points: (N, 3) surface points, metres.
+        normals: (N, 3) their unit normals.
+        seeds: (S,) indices of the seeds.
+        config: The sampler's settings.
+
+    Returns:
+        The pairs, by seed.
+    """
+    step = np.pi / config.num_azimuths
+    base = np.rint(_base_azimuth(points, normals, seeds) / step).astype(np.int64)
+    roll = np.rint(np.arange(config.num_rolls) * config.num_azimuths / config.num_rolls)
+    azimuth = (base[:, None] + roll.astype(np.int64)) % config.num_azimuths
+    tilt = np.arange(len(config.tilts_deg)) * config.num_azimuths
+    orientation = (tilt[:, None] + azimuth[:, None]).reshape(len(seeds), -1)
+    rotations = gripper_orientations(config)
+    from_behind = np.einsum("si,soi->so", normals[seeds], rotations[orientation, :, 2])
+    seed, place = np.nonzero(from_behind < _MAX_FROM_BEHIND)
+    return Hypotheses(seed=seed, orientation=orientation[seed, place], rotations=rotations)
 
 
-def _base_azimuth(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+def _base_azimuth(points: np.ndarray, normals: np.ndarray, seeds: np.ndarray) -> np.ndarray:
     """Guess the closing direction: the normal's, or across the narrow side of the outline."""
-    x, y = offsets[..., 0], offsets[..., 1]
-    near = (x**2 + y**2 < _OUTLINE_RADIUS_M**2) & (np.abs(offsets[..., 2]) < _OUTLINE_HEIGHT_M)
-    weight = near / np.maximum(near.sum(axis=1, keepdims=True), 1)
-    dx = x - (x * weight).sum(axis=1, keepdims=True)
-    dy = y - (y * weight).sum(axis=1, keepdims=True)
-    xx, yy, xy = ((a * b * weight).sum(axis=1) for a, b in ((dx, dx), (dy, dy), (dx, dy)))
-    narrow = 0.5 * np.arctan2(2 * xy, xx - yy) + np.pi / 2
-    is_side = np.linalg.norm(normals[:, :2], axis=1) > _MIN_HORIZONTAL
-    return np.where(is_side, np.arctan2(normals[:, 1], normals[:, 0]), narrow)
+    columns = sort_into_columns(points, _OUTLINE_RADIUS_M / 3)
+    origins = points[seeds]
+    reach = np.float32(_OUTLINE_RADIUS_M)
+    seed, point = columns.pairs(origins[:, :2] - reach, origins[:, :2] + reach)
+    x, y, z = (points[point] - origins[seed]).T.astype(float)
+    near = (x**2 + y**2 < _OUTLINE_RADIUS_M**2) & (np.abs(z) < _OUTLINE_HEIGHT_M)
+    seed, x, y = seed[near], x[near], y[near]
+    count = np.bincount(seed, minlength=len(seeds)).clip(1)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return np.bincount(seed, values, len(seeds)) / count
+
+    dx, dy = x - mean(x)[seed], y - mean(y)[seed]
+    narrow = 0.5 * np.arctan2(2 * mean(dx * dy), mean(dx * dx) - mean(dy * dy)) + np.pi / 2
+    across = normals[seeds, :2]
+    is_side = np.linalg.norm(across, axis=1) > _MIN_HORIZONTAL
+    return np.where(is_side, np.arctan2(across[:, 1], across[:, 0]), narrow)

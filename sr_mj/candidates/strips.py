@@ -6,12 +6,13 @@ object is there, and how steep its flanks are, also on a side whose face no came
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import torch
 
 from sr_mj.candidates.config import AntipodalConfig
-from sr_mj.candidates.neighbourhoods import Neighbourhoods, exact_axes
+from sr_mj.candidates.frames import Hypotheses
 
 _BIN_M = 0.004
 _HALF_BINS = 17
@@ -20,6 +21,13 @@ _NUM_LANES = 3
 # Half a pad and 2 mm, so that a finger has room at its sides too.
 _STRIP_HALF_M = 0.013
 _LANE_M = 2 * _STRIP_HALF_M / _NUM_LANES
+# Lines of the height image in a lane: seeds lie anywhere, and a strip begins at the nearest line.
+_LINES_A_LANE = 4
+_LINE_M = _LANE_M / _LINES_A_LANE
+# BLAS sums in an order that depends on where an array lies in memory. Multiples of 2^-12 m (0.24
+# mm) below half a metre, times multiples of 2^-11: a sum of three has 24 bits, which float32 holds.
+# The products are exact in any order, and the same seed gives the same bytes.
+_POINT_STEP_M, _AXIS_STEP = 2.0**-12, 2.0**-11
 _EMPTY = -1.0
 # Points this little above the fingertips' plane do not stop a finger; noise does as much.
 _TOUCH_M = 0.001
@@ -30,7 +38,6 @@ _EDGE_BINS = 6
 # The finger's thickness and 2 mm.
 _FINGER_BINS = 4
 _MIN_DEPTH_M = 0.0035
-_SEEDS_A_CHUNK = 24
 # Signs of the outward closing direction at the left and the right contact.
 OUTWARD = np.array([-1.0, 1.0], np.float32)
 
@@ -74,51 +81,61 @@ class FingerPlacements:
 
 
 def scan_strips(
-    around: Neighbourhoods, rotations: np.ndarray, valid: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    points: np.ndarray, origins: np.ndarray, hypotheses: Hypotheses
+) -> tuple[np.ndarray, np.ndarray]:
     """Measure height profiles under the gripper.
 
+    Seen along one approach, all strips with the same closing direction are windows of one image
+    of heights; every orientation has its own.
+
     Args:
-        around: Points around every one of S seeds.
-        rotations: (S, O, 3, 3) float32 orientations, tool to world.
-        valid: (S, O) mask of the orientations to scan.
+        points: (N, 3) float32 positions of everything on the table, metres.
+        origins: (S, 3) positions of the seeds.
+        hypotheses: H pairs of seed and orientation.
 
     Returns:
-        Seed (H,) and orientation (H,) indices, and profiles (H, lanes, bins) float32: the largest
-        height towards the gripper over the seed, metres; -1 where the strip holds no point.
+        Profiles (H, lanes, bins) float32: the largest height towards the gripper over the seed,
+        metres; -1 where the strip holds no point. And (H,) float32 positions of the middle bin
+        along the closing direction, from the seed.
     """
-    seed, orientation = np.nonzero(valid)
-    profiles = np.empty((len(seed), _NUM_LANES, _NUM_BINS), np.float32)
-    # Seeds with neighbourhoods of similar size share a chunk, so that little padding is scanned.
-    by_size = np.argsort(around.count, kind="stable")
-    is_row = np.full(valid.shape, -1)
-    is_row[seed, orientation] = np.arange(len(seed))
-    for start in range(0, len(by_size), _SEEDS_A_CHUNK):
-        part = by_size[start : start + _SEEDS_A_CHUNK]
-        offsets = around.offsets[part, : around.count[part[-1]]]
-        rows = is_row[part]
-        profiles[rows[rows >= 0]] = _scan(offsets, rotations[part])[rows >= 0]
-    return seed, orientation, profiles
+    middle = points.mean(axis=0) if len(points) else np.zeros(3)
+    # (O, 3, N): coordinates of the points along the tool's axes, for every orientation.
+    axes = _rounded(hypotheses.rotations.transpose(0, 2, 1), _AXIS_STEP)
+    local = torch.matmul(axes, _rounded(points - middle, _POINT_STEP_M).T).numpy()
+    seeds = torch.matmul(axes, _rounded(origins - middle, _POINT_STEP_M).T).numpy()
+    profiles = np.empty((len(hypotheses.seed), _NUM_LANES, _NUM_BINS), np.float32)
+    shift_m = np.empty(len(hypotheses.seed), np.float32)
+    order = np.argsort(hypotheses.orientation, kind="stable")
+    ends = np.searchsorted(hypotheses.orientation[order], np.arange(len(local) + 1))
+    for index, (start, end) in enumerate(pairwise(ends)):
+        rows = order[start:end]
+        at = seeds[index][:, hypotheses.seed[rows]]
+        profiles[rows], shift_m[rows] = _windows(local[index], at)
+    return profiles, shift_m
 
 
-def _scan(offsets: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-    """Profiles (s, O, lanes, bins) of a few seeds."""
-    count, num_orientations = rotations.shape[:2]
-    local = torch.from_numpy(offsets)
-    # (3, s, 3, O): the world components of each tool axis.
-    axes = exact_axes(rotations).permute(3, 0, 2, 1).contiguous()
-    y = torch.bmm(local, axes[1]).flatten()
-    keep = torch.nonzero(y.abs() < _STRIP_HALF_M)[:, 0]
-    x = torch.bmm(local, axes[0]).flatten()[keep]
-    height = -torch.bmm(local, axes[2]).flatten()[keep]
-    lane = ((y[keep] + _STRIP_HALF_M) * (1 / _LANE_M)).long().clamp_(max=_NUM_LANES - 1)
-    column = (x * (1 / _BIN_M) + (_HALF_BINS + 1.5)).long().clamp_(0, _NUM_BINS + 1)
-    of_seed = keep // (offsets.shape[1] * num_orientations)
-    row = of_seed * num_orientations + keep % num_orientations
-    # One bin more at each end takes what lies outside.
-    profile = torch.full((count * num_orientations * _NUM_LANES * (_NUM_BINS + 2),), _EMPTY)
-    profile.scatter_reduce_(0, (row * _NUM_LANES + lane) * (_NUM_BINS + 2) + column, height, "amax")
-    return profile.view(count, num_orientations, _NUM_LANES, -1)[..., 1:-1].numpy()
+def _rounded(values: np.ndarray, step: float) -> torch.Tensor:
+    return torch.from_numpy((np.rint(values / step) * step).astype(np.float32))
+
+
+def _windows(local: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Profiles (R, lanes, bins) and shifts (R,) at seeds (3, R) among points (3, N)."""
+    # Room for a window at every border.
+    low = local[:2].min(axis=1) - [_NUM_BINS * _BIN_M, 2 * _STRIP_HALF_M]
+    column = ((local[0] - low[0]) * (1 / _BIN_M)).astype(np.int64)
+    line = ((local[1] - low[1]) * (1 / _LINE_M)).astype(np.int64)
+    shape = (line.max() + 4 * _NUM_LANES * _LINES_A_LANE, column.max() + 2 * _NUM_BINS)
+    image = np.full(shape, 2 * _EMPTY, np.float32)
+    np.maximum.at(image.reshape(-1), line * shape[1] + column, -local[2])
+    lanes = np.maximum(image[:-1], image[1:])
+    lanes = np.maximum(lanes[:-2], lanes[2:])
+    column = ((at[0] - low[0]) * (1 / _BIN_M)).astype(np.int64)
+    line = np.rint((at[1] - low[1] - _STRIP_HALF_M) * (1 / _LINE_M)).astype(np.int64)
+    first = line * shape[1] + column - _HALF_BINS
+    window = np.arange(_NUM_LANES)[:, None] * (_LINES_A_LANE * shape[1]) + np.arange(_NUM_BINS)
+    profiles = lanes.reshape(-1)[first[:, None, None] + window]
+    shift = (column + 0.5) * _BIN_M + low[0] - at[0]
+    return np.maximum(profiles + at[2][:, None, None], _EMPTY), shift
 
 
 def place_fingers(
@@ -126,6 +143,7 @@ def place_fingers(
     rotation: np.ndarray,
     depth_m: np.ndarray,
     profiles: np.ndarray,
+    shift_m: np.ndarray,
     config: AntipodalConfig,
 ) -> FingerPlacements:
     """Find the nearest gaps for the two fingers on either side of the seed.
@@ -135,6 +153,7 @@ def place_fingers(
         rotation: (H, 3, 3) orientations.
         depth_m: (H,) depths of the fingertips beyond the seed.
         profiles: (H, lanes, bins) profiles from `scan_strips`.
+        shift_m: (H,) positions of their middle bins.
         config: The sampler's settings.
 
     Returns:
@@ -166,7 +185,7 @@ def place_fingers(
         seed=seed[rows],
         rotation=rotation[rows],
         depth_m=depth_m[rows],
-        center_m=((left + right) / 2 - _HALF_BINS).astype(np.float32) * _BIN_M,
+        center_m=((left + right) / 2 - _HALF_BINS).astype(np.float32) * _BIN_M + shift_m[rows],
         width_m=width[rows].astype(np.float32),
         engagement_m=engagement[rows],
         outline=outline,

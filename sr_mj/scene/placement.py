@@ -19,6 +19,7 @@ RING_M = (0.05, 0.15)
 
 _CORE_SHARE = 1 / 3
 _CLOSE_M = 1e-4
+_WORLD = 0  # the body that the table belongs to
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,7 +150,7 @@ def is_placed(scene: Scene, moved: str, region: PlaceRegion) -> bool:
 
     Inside: it touches the reference and neither the table nor anything else that lies on it, and
     its centre is over the reference's footprint. Outside: its centre lies in the ring around the
-    reference as that lies now, and it touches no other object.
+    reference as that lies now, and it touches the table and no other object.
 
     Args:
         scene: The scene, settled.
@@ -168,7 +169,8 @@ def is_placed(scene: Scene, moved: str, region: PlaceRegion) -> bool:
         return over and touched == {reference}
     objects = {item.body.body_id for item in scene.objects}
     distance = shapely.distance(outline, shapely.Point(center[:2]))
-    return RING_M[0] <= distance <= RING_M[1] and not touched & objects
+    is_free = _WORLD in touched and not touched & objects
+    return RING_M[0] <= distance <= RING_M[1] and is_free
 
 
 def touched_bodies(scene: Scene, name: str) -> set[int]:

@@ -87,6 +87,69 @@ def test_place_ignores_height(make_observation, rng: np.random.Generator) -> Non
     assert logits.argmax() == 1
 
 
+def _for_place(observation: Observation, make_observation: Any, side: str) -> Observation:
+    relation = {"inside": "on", "outside": "near"}[side]
+    return make_observation(
+        np.random.default_rng(0),
+        observation.num_points,
+        points=observation.points,
+        similarity=observation.similarity,
+        confidence=observation.confidence,
+        phase="place",
+        relation=relation,
+        side=side,
+    )
+
+
+@pytest.mark.parametrize("target", range(3))
+@pytest.mark.parametrize("noise", [0.0, 0.025])
+def test_places_inside_over_the_middle_of_the_reference(
+    make_observation, rng: np.random.Generator, target: int, noise: float
+) -> None:
+    cloud = _cloud(rng, make_observation, target=target, noise=noise)
+    observation = _for_place(cloud, make_observation, "inside")
+    beside = CENTERS[target] + [[0.1, 0.0, 0.05], [0.04, 0.0, 0.05], [0.0, 0.0, 0.08]]
+    places = np.concatenate([CENTERS, beside])
+    prior = np.where(np.arange(6) == 5, 0.1, 1.0)
+    # Over another object nothing is wrong with the prior; over the reference the height is free.
+    scores = GroundingPolicy().score(observation, _grasps(places, prior, kind="place"), rng)
+    assert scores.best in (target, 5)
+    assert scores.logits[5] > scores.logits[4] > scores.logits[3]
+
+
+@pytest.mark.parametrize("target", range(3))
+@pytest.mark.parametrize("noise", [0.0, 0.025])
+def test_places_around_in_the_middle_of_the_ring(
+    make_observation, rng: np.random.Generator, target: int, noise: float
+) -> None:
+    cloud = _cloud(rng, make_observation, target=target, noise=noise)
+    observation = _for_place(cloud, make_observation, "outside")
+    radius = np.array([0.0, 0.05, 0.09, 0.13, 0.17, 0.21, 0.3])
+    places = CENTERS[target] + np.c_[-radius, 0 * radius, np.full(7, 0.05)]
+    logits = GroundingPolicy().score(observation, _grasps(places, kind="place"), rng).logits
+    distance = [
+        np.linalg.norm(
+            cloud.points[target * POINTS_PER_OBJECT :][:POINTS_PER_OBJECT, :2] - place, axis=1
+        ).min()
+        for place in places[:, :2]
+    ]
+    assert abs(distance[int(logits.argmax())] - 0.1) < 0.025
+    assert logits[0] < logits[2] > logits[-1]
+
+
+@pytest.mark.parametrize(("side", "best"), [("inside", 0), ("outside", 1)])
+def test_place_score_ignores_height_and_order(
+    make_observation, rng: np.random.Generator, side: str, best: int
+) -> None:
+    cloud = _cloud(rng, make_observation, target=0)
+    observation = _for_place(cloud, make_observation, side)
+    places = np.array([CENTERS[0], CENTERS[0] - [0.13, 0, 0], CENTERS[2]])
+    lifted = np.concatenate([places, np.add(places[::-1], [0, 0, 0.1])])
+    logits = GroundingPolicy().score(observation, _grasps(lifted, kind="place"), rng).logits
+    np.testing.assert_allclose(logits[:3], logits[3:][::-1], atol=1e-6)
+    assert logits[:3].argmax() == best
+
+
 @pytest.mark.parametrize("num_points", [0, 1, 50])
 def test_without_contrast_the_prior_decides(
     make_observation, rng: np.random.Generator, num_points: int
@@ -148,6 +211,8 @@ def test_no_candidates(make_observation, rng: np.random.Generator) -> None:
     [
         ({"pick_sigma_m": 0.0}, "pick_sigma_m: got 0, expected a value above 0."),
         ({"temperature": -1.0}, "temperature: got -1, expected a value above 0."),
+        ({"ring_m": 0.0}, "ring_m: got 0, expected a value above 0."),
+        ({"grow_level": 0.0}, "grow_level: got 0, expected a value between 0 and 1."),
         ({"region_level": 1.0}, "region_level: got 1, expected a value between 0 and 1."),
         ({"region_weight": 1.5}, "region_weight: got 1.5, expected 0 to 1."),
         ({"prior_exponent": -0.1}, "prior_exponent: got -0.1, expected at least 0."),

@@ -27,6 +27,20 @@ from policy.errors import InvalidArrayError
             "workspace: got corners [0.276, -0.224, 0.0] and [1.0, -0.3, 1.0], expected min < max "
             "on every axis.",
         ),
+        ({"phrase_pooled": np.zeros(9)}, "phrase_pooled: got shape (9,), expected (C=16,)."),
+        ({"phase": "push"}, "phase: got 'push', expected 'pick' or 'place'."),
+        (
+            {"phase": "place", "relation": "under", "side": "below"},
+            "side: got 'below', expected 'inside' or 'outside'.",
+        ),
+        (
+            {"phase": "place", "relation": "near"},
+            "relation and side: got 'near' and None, expected both or neither.",
+        ),
+        (
+            {"relation": "near", "side": "outside"},
+            "relation: got 'near' in the pick phase, expected None.",
+        ),
     ],
 )
 def test_bad_observation(
@@ -50,3 +64,23 @@ def test_observation_holds_read_only_copies(make_observation, rng: np.random.Gen
 
 def test_empty_cloud_is_valid(make_observation, rng: np.random.Generator) -> None:
     assert make_observation(rng, 0, num_tokens=0).num_points == 0
+
+
+def test_place_phase(make_observation, rng: np.random.Generator) -> None:
+    phrase = rng.normal(size=16)
+    observation = make_observation(
+        rng, 4, phase="place", relation="near", side="outside", phrase_pooled=phrase
+    )
+    np.testing.assert_array_equal(observation.phrase_pooled, phrase.astype(np.float32))
+    assert not observation.phrase_pooled.flags.writeable
+    assert (observation.phase, observation.relation, observation.side) == (
+        "place",
+        "near",
+        "outside",
+    )
+
+
+def test_by_default_nothing_is_said_of_a_place(make_observation, rng: np.random.Generator) -> None:
+    observation = make_observation(rng, 4)
+    assert observation.phase == "pick" and observation.phrase_pooled is None
+    assert observation.relation is None and observation.side is None

@@ -4,9 +4,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from sr_mj.candidates.collision import hits_points, swept_boxes, table_clearance
+from sr_mj.candidates.columns import points_in_boxes, sort_into_columns
 from sr_mj.candidates.config import AntipodalConfig
-from sr_mj.candidates.frames import seed_frames
-from sr_mj.candidates.neighbourhoods import exact_axes, gather_neighbours
+from sr_mj.candidates.frames import Hypotheses, choose_orientations, gripper_orientations
 from sr_mj.candidates.ranking import best_per_group, select_spread
 from sr_mj.candidates.strips import depth_hypotheses, place_fingers, scan_strips
 from sr_mj.candidates.surface import choose_seeds, thin, unseen_walls, voxel_keys, voxel_means
@@ -68,62 +68,111 @@ def test_seeds_are_spread_and_bounded():
     assert farthest < 0.03
 
 
-def test_neighbours_are_those_within_the_radius():
+def test_columns_pair_rectangles_with_all_points_in_them():
     rng = np.random.default_rng(1)
     points = rng.uniform(0.3, 0.6, (3000, 3)).astype(np.float32)
-    seeds = points[:130]
-    found = gather_neighbours(points, seeds, 0.05)
-    tree = cKDTree(points)
-    for row, seed in enumerate(seeds):
-        size = found.count[row]
-        neighbours = set(found.index[row, :size])
-        # Offsets are rounded to 0.12 mm, which may decide at the border.
-        assert set(tree.query_ball_point(seed, 0.0498)) <= neighbours
-        assert neighbours <= set(tree.query_ball_point(seed, 0.0502))
-        assert (found.index[row, size:] == -1).all()
-        offsets = points[found.index[row, :size]] - seed
-        np.testing.assert_allclose(found.offsets[row, :size], offsets, atol=2.0**-14 + 1e-7)
-        assert (found.offsets[row, size:] > 1).all()
+    lower = rng.uniform(0.25, 0.6, (40, 2))
+    upper = lower + rng.uniform(0, 0.1, (40, 2))
+    row, point = sort_into_columns(points, 0.012).pairs(lower, upper)
+    assert (np.diff(row) >= 0).all()
+    assert len(set(zip(row, point, strict=True))) == len(row)
+    xy = points[point, :2]
+    # Whole columns are found: at most one more to every side.
+    assert ((xy > lower[row] - 0.0121) & (xy < upper[row] + 0.0121)).all()
+    inside = ((points[:, None, :2] >= lower) & (points[:, None, :2] <= upper)).all(axis=2)
+    assert {(b, a) for a, b in np.argwhere(inside)} <= set(zip(row, point, strict=True))
 
 
-def test_products_with_offsets_are_exact_in_any_order():
+@pytest.mark.parametrize(("num_points", "num_boxes"), [(0, 3), (50, 0), (0, 0)])
+def test_columns_without_points_or_rectangles_pair_nothing(num_points, num_boxes):
+    points = np.full((num_points, 3), 0.5, np.float32)
+    columns = sort_into_columns(points, 0.01)
+    row, point = columns.pairs(np.zeros((num_boxes, 2)), np.ones((num_boxes, 2)))
+    assert len(row) == len(point) == num_points * num_boxes
+
+
+def test_points_in_boxes_are_those_that_a_pairwise_test_finds():
     rng = np.random.default_rng(6)
-    points = rng.uniform(0.3, 0.5, (2000, 3)).astype(np.float32)
-    offsets = gather_neighbours(points, points[:1], 0.12).offsets[0]
-    axes = exact_axes(Rotation.random(rng=rng).as_matrix()[None])[0].numpy()
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=2e-3)
-    exact = offsets.astype(float) @ axes.astype(float)
-    for order in ([0, 1, 2], [2, 0, 1], [1, 2, 0]):
-        summed = sum(offsets[:, [k]] * axes[[k]] for k in order)
-        np.testing.assert_array_equal(summed, exact)
+    points = rng.uniform(0.3, 0.5, (800, 3)).astype(np.float32)
+    poses = _poses(30, rng)
+    poses[:, :3, 3] += 0.4
+    low, high = -rng.uniform(0, 0.05, (30, 3)), rng.uniform(0, 0.05, (30, 3))
+    row, point = points_in_boxes(points, sort_into_columns(points, 0.01), poses, low, high)
+    local = np.einsum("knj,kji->kni", points - poses[:, None, :3, 3], poses[:, :3, :3])
+    inside = ((local > low[:, None]) & (local < high[:, None])).all(axis=2)
+    assert inside.sum() > 100
+    assert set(zip(row, point, strict=True)) == set(map(tuple, np.argwhere(inside)))
 
 
-def test_frames_are_rotations_that_do_not_come_from_behind():
+def test_orientations_are_rotations_and_closed_under_the_grippers_symmetry():
+    rotations = gripper_orientations(CONFIG).astype(float)
+    np.testing.assert_allclose(
+        rotations @ rotations.transpose(0, 2, 1), np.broadcast_to(np.eye(3), rotations.shape),
+        atol=1e-6,
+    )  # fmt: skip
+    np.testing.assert_allclose(np.linalg.det(rotations), 1, atol=1e-6)
+    # Half a turn about the vertical, then half a turn of the gripper about its approach.
+    turned = np.diag([-1.0, -1.0, 1.0]) @ rotations @ np.diag([-1.0, -1.0, 1.0])
+    distance = np.abs(turned[:, None] - rotations).max(axis=(2, 3)).min(axis=1)
+    assert distance.max() < 1e-6
+
+
+def test_orientations_do_not_come_from_behind_and_follow_the_surface():
     rng = np.random.default_rng(2)
-    normals = rng.normal(size=(50, 3))
+    points = rng.uniform(0, 0.3, (2000, 3)).astype(np.float32)
+    normals = rng.normal(size=(2000, 3)).astype(np.float32)
     normals[:, 2] = np.abs(normals[:, 2])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    offsets = rng.uniform(-0.03, 0.03, (50, 40, 3))
-    rotations, valid = seed_frames(normals, offsets, CONFIG)
-    chosen = rotations[valid].astype(float)
-    np.testing.assert_allclose(
-        chosen @ chosen.transpose(0, 2, 1), np.broadcast_to(np.eye(3), chosen.shape), atol=1e-5
-    )
-    np.testing.assert_allclose(np.linalg.det(chosen), 1, atol=1e-5)
-    seed, _ = np.nonzero(valid)
-    assert ((chosen[:, :, 2] * normals[seed]).sum(axis=1) < 0.31).all()
-    assert (chosen[:, 2, 2] < -np.cos(np.radians(63))).all()
+    seeds = np.arange(50)
+    found = choose_orientations(points, normals, seeds, CONFIG)
+    chosen = found.rotations[found.orientation]
+    assert (np.diff(found.seed) >= 0).all()
+    assert ((chosen[:, :, 2] * normals[found.seed]).sum(axis=1) < 0.31).all()
+    assert (chosen[:, 2, 2] < -np.cos(np.radians(51))).all()
+    # A seed on a side is closed on along its normal, to half the step between azimuths.
+    side = np.flatnonzero(np.linalg.norm(normals[seeds, :2], axis=1) > 0.9)
+    across = normals[side, :2] / np.linalg.norm(normals[side, :2], axis=1, keepdims=True)
+    for seed, direction in zip(side, across, strict=True):
+        cosine = np.abs(chosen[found.seed == seed, :2, 0] @ direction).max()
+        assert cosine > np.cos(np.radians(90 / CONFIG.num_azimuths + 0.1))
+
+
+def test_profiles_are_the_largest_heights_in_lanes_and_bins():
+    rng = np.random.default_rng(3)
+    points = rng.uniform([0.4, -0.1, 0], [0.6, 0.1, 0.06], (4000, 3)).astype(np.float32)
+    origins = points[:20]
+    rotations = gripper_orientations(CONFIG)
+    orientation = rng.integers(len(rotations), size=20)
+    pairs = Hypotheses(seed=np.arange(20), orientation=orientation, rotations=rotations)
+    profiles, shift_m = scan_strips(points, origins, pairs)
+    assert profiles.shape == (20, 3, 35)
+    for row in range(20):
+        local = (points - origins[row]) @ rotations[orientation[row]]
+        assert abs(shift_m[row]) < 0.0022
+        column = np.rint((local[:, 0] - shift_m[row]) / 0.004) + 17
+        for lane, middle in enumerate((-0.0087, 0, 0.0087)):
+            for bin_ in range(35):
+                # Lanes begin at the nearest of lines 2.2 mm apart.
+                certain = np.abs(local[:, 1] - middle) < 0.0043 - 0.0015
+                possible = np.abs(local[:, 1] - middle) < 0.0043 + 0.0015
+                is_bin = np.abs((local[:, 0] - shift_m[row]) / 0.004 + 17 - bin_) < 0.4
+                height = profiles[row, lane, bin_]
+                assert height >= (-local[is_bin & certain, 2]).max(initial=-1) - 1e-3
+                near = np.abs(column - bin_) <= 1
+                assert height <= (-local[near & possible, 2]).max(initial=-1) + 1e-3
 
 
 def test_fingers_are_placed_beside_a_ridge():
     ridge = _grid(
         np.arange(-0.0165, 0.0166, 0.003), np.arange(-0.03, 0.03, 0.003), np.arange(0, 0.05, 0.003)
     )
-    around = gather_neighbours(ridge, np.array([[0, 0, 0.048]], np.float32), 0.07)
-    vertical = np.diag([1.0, -1.0, -1.0]).astype(np.float32)[None, None]
-    seed, _, profiles = scan_strips(around, vertical, np.ones((1, 1), bool))
+    origins = np.array([[0, 0, 0.048]], np.float32)
+    vertical = np.diag([1.0, -1.0, -1.0]).astype(np.float32)[None]
+    seed = np.zeros(1, np.int64)
+    pairs = Hypotheses(seed=seed, orientation=seed, rotations=vertical)
+    profiles, shift_m = scan_strips(ridge, origins, pairs)
     depth_m = np.array([0.02], np.float32)
-    placed = place_fingers(seed, vertical[0], depth_m, profiles, CONFIG)
+    placed = place_fingers(seed, vertical, depth_m, profiles, shift_m, CONFIG)
     assert len(placed.seed) == 1
     assert abs(placed.center_m[0]) < 0.003
     assert 0.033 <= placed.width_m[0] < 0.042

@@ -155,6 +155,22 @@ def test_runs_an_arrangement(command):
     assert record["success"] and record["attempts"][-1]["grasped"] in record["targets"]
 
 
+def test_runs_a_place_arrangement(command, tmp_path):
+    done = command("sr_mj.run", "--scene", "place-seen-01", "--policy", "oracle", "--out", "o")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert re.match(r"ho +\d+ grasps .*handed over: grasped toy_nut", lines[3])
+    assert re.match(r"pl +\d+ places .*placed toy_nut", lines[-2])
+    assert lines[-1].startswith("Result success: toy_nut placed near darlie_box")
+    record = json.loads((tmp_path / "o" / "result.json").read_text())
+    assert record["success"] and (record["num_attempts"], record["num_actions"]) == (0, 1)
+    assert (record["relation"], record["references"]) == ("near", ["darlie_box"])
+    place = record["attempts"][-1]
+    assert (place["kind"], place["reason"], place["reward"]) == ("place", "placed", 1.0)
+    for name in ("hand_over_01_grasp", "place_01_views", "place_01_similarity", "place_01_place"):
+        assert np.asarray(Image.open(tmp_path / "o" / f"{name}.png")).std() > 5
+
+
 def test_exports_a_scene(command, tmp_path):
     done = command("sr_mj.export", "--scene", "single", "--seed", 1, "--out", "scene")
     assert done.returncode == 0, done.stderr
@@ -178,7 +194,10 @@ CASE = "give me the pear\n0\nassets/015.urdf 0.5 0 0.2 0 0 0\n"
         ("run", ["--goal", ""], "The goal is blank; say what to grasp, or leave the goal out."),
         ("run", ["--record", "film.avi"], "Cannot record to 'film.avi': the name ends in '.avi', expected one of .mp4, .gif."),
         ("run", ["--record", "no/film.mp4"], "Cannot record to 'no/film.mp4': create its folder first."),
-        ("run", ["--scene", "place-seen-03"], "Arrangement 'place-seen-03' asks for placing only, which is not carried out yet; choose a grasp or pick-place arrangement, or export this one."),
+        ("run", ["--scene", "place8", "--goal", "put it near the bowl"], "The goal 'put it near the bowl' does not say what to pick; say it first, as in 'give me the apple, put it near the bowl', or choose a place arrangement."),
+        ("run", ["--generator", "antipodl"], "Unknown generator 'antipodl'. Generators: antipodal, file:PATH or http://HOST:PORT/PATH."),
+        ("run", ["--perturb-cm", "-1"], "Perturbation of positions is -1 cm; expected 0 to 10."),
+        ("run", ["--perturb-deg", "100"], "Perturbation of orientations is 100 degrees; expected 0 to 90."),
         ("run", ["--cases", "mine.txt", "--goal", "give me the pear"], "Test cases bring their own goals; leave --goal or --cases out."),
         ("run", ["--cases", "mine.txt"], "mine.txt: 0 lines; expected the goal, the targets' indices, and one line an object."),
         ("run", ["--out", "."], "Output folder '.' exists and is not empty; choose a new one."),

@@ -41,7 +41,7 @@ def test_two_waypoints_move_as_fast_as_the_binding_limit_allows():
         np.array([np.zeros(6), np.full(6, 3.0)]), MotionLimits(speed=1, acceleration=50)
     )
     _, qvel = far.sample(np.linspace(0, far.duration_s, 1001))
-    assert np.abs(qvel).max() == pytest.approx(1.0, rel=1e-4)
+    assert np.abs(qvel).max() == pytest.approx(1.0, rel=5e-3)
 
 
 def test_coinciding_waypoints_take_no_time():

@@ -31,8 +31,9 @@ def oracle_attempts(scene: Scene, lifter: MultiViewLifter, seed: int) -> int | N
     """
     policy = make_policy("oracle", scene)
     with assembled(scene, lifter=lifter, policy=policy) as pipeline:
-        attempts = list(run_episode(scene, pipeline, seed=seed, max_attempts=DEFAULT_ATTEMPTS))
-    return len(attempts) if attempts[-1].outcome.success else None
+        attempts = run_episode(scene, pipeline, seed=seed, max_attempts=DEFAULT_ATTEMPTS)
+        picks = [attempt for attempt in attempts if attempt.kind == "pick"]
+    return len(picks) if picks[-1].outcome.success else None
 
 
 def holds_when_put_down(

@@ -1,0 +1,66 @@
+"""One sentence, two phases: what to say while picking, and what while placing."""
+
+from dataclasses import dataclass
+
+from perception.language import parse_instruction
+from policy.actions import ActionKind
+from policy.observation import PlaceSide
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseText:
+    """What an instruction says about one phase.
+
+    Attributes:
+        phase: Pick or place.
+        text: The instruction's part for this phase.
+        relation: One of `perception.relations.RELATIONS`; None for picking, or where the
+            instruction was not understood.
+        side: Whether the relation asks for a place in or on the reference, or around it.
+    """
+
+    phase: ActionKind
+    text: str
+    relation: str | None = None
+    side: PlaceSide | None = None
+
+
+def names_target(text: str) -> bool:
+    """Tell whether an instruction says what to pick; "put it near the bowl" does not."""
+    return parse_instruction(text).target is not None
+
+
+def pick_text(text: str) -> PhaseText:
+    """Return the part of an instruction that says what to pick.
+
+    Args:
+        text: The instruction.
+
+    Returns:
+        The instruction itself, unless it also says where to place: then only what comes before,
+        in a template's wording, since the place part names another object.
+    """
+    instruction = parse_instruction(text)
+    if instruction.relation is None or instruction.target is None:
+        return PhaseText(phase="pick", text=text)
+    return PhaseText(phase="pick", text=f"give me the {instruction.target}")
+
+
+def place_text(text: str) -> PhaseText:
+    """Return the part of an instruction that says where to place.
+
+    Args:
+        text: The instruction.
+
+    Returns:
+        That part, in a template's wording; the whole instruction where no relation is found.
+    """
+    instruction = parse_instruction(text)
+    if instruction.relation is None:
+        return PhaseText(phase="place", text=text)
+    return PhaseText(
+        phase="place",
+        text=f"put it {instruction.relation} the {instruction.reference}",
+        relation=instruction.relation,
+        side=instruction.region,
+    )
