@@ -79,7 +79,7 @@ def held_object(cloud: GeometryCloud, T_world_tool: np.ndarray, width_m: float) 
     gripped = _is_between_fingers(points, pose, width_m, config)
     if gripped.any():
         mine = _belongs(parts, gripped)
-        bottom_m = _support_height(points, mine)
+        bottom_m = support_height(points, mine)
         seen = points[mine]
     else:
         seen = _space_between_fingers(pose, width_m, config)
@@ -126,13 +126,20 @@ def _belongs(parts: Parts, gripped: np.ndarray) -> np.ndarray:
     return mine[parts.labels] | gripped
 
 
-def _support_height(points: np.ndarray, mine: np.ndarray) -> float:
+def support_height(points: np.ndarray, mine: np.ndarray) -> float:
     """Estimate the height of what an object stood on: the table, unless it was seen to be lower.
 
     Nine of ten objects of a heap reach down to the table somewhere, whatever they lean on. Only
     an object around which, on most sides, something else is seen right below its lowest visible
     points stands on that: too low an estimate lets it fall a little, too high a one presses it
     into what it is put on.
+
+    Args:
+        points: (N, 3) points of the cloud, metres, the table at z = 0.
+        mine: (N,) which of them are the object's.
+
+    Returns:
+        The height, metres.
     """
     own, others = points[mine], points[~mine]
     lowest = float(np.quantile(own[:, 2], _LOW_SHARE))

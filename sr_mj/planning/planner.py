@@ -33,6 +33,9 @@ class Planner:
     Args:
         config: Geometry and speed.
         kinematics: IK solver; made when None.
+
+    Attributes:
+        postures_over_bin: (B, 6) postures, rad, in which what is held is carried over the bin.
     """
 
     def __init__(
@@ -45,7 +48,7 @@ class Planner:
         T_world_bin = np.diag([1.0, -1.0, -1.0, 1.0])
         T_world_bin[:3, 3] = (*BIN_CENTER[:2], self.config.carry_height_m)
         (over_bin,) = solve_ways([T_world_bin[None]], HOME_QPOS, np.inf, np.pi).postures
-        self._over_bin = over_bin[self._body.is_free(over_bin[:, 0]), 0]
+        self.postures_over_bin = over_bin[self._body.is_free(over_bin[:, 0]), 0]
 
     def reachable(
         self, candidates: ActionCandidates, *, obstacles: np.ndarray | None = None
@@ -99,7 +102,7 @@ class Planner:
             body=self._body,
             obstacles=find_obstacles(obstacles),
             start=np.asarray(HOME_QPOS if start is None else start, float),
-            over_bin=self._over_bin,
+            over_bin=self.postures_over_bin,
         )
         is_reachable = find_reachable(candidates.take(order), task.links, self.config)
         for index in order[is_reachable]:

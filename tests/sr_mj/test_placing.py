@@ -8,7 +8,7 @@ from perception.cloud import GeometryCloud
 from perception.fusion import FusionConfig, fuse
 from sr_mj.candidates import AntipodalSampler
 from sr_mj.candidates.generator import PlaceGenerator
-from sr_mj.candidates.held import HeldObject, _support_height, held_object
+from sr_mj.candidates.held import HeldObject, held_object, support_height
 from sr_mj.candidates.place_columns import columns_of, gripper_columns
 from sr_mj.candidates.place_config import PlaceConfig
 from sr_mj.candidates.place_heights import height_map
@@ -141,11 +141,11 @@ def test_a_neighbour_is_not_held():
 def test_what_something_else_carries_all_around_stands_on_that():
     points = cloud_of(box((0.12, 0.12, 0.05)), box((0.04, 0.03, 0.04), z=0.052), table=False).points
     is_upper = points[:, 2] > 0.051
-    assert _support_height(points, is_upper) == pytest.approx(0.05, abs=0.002)
+    assert support_height(points, is_upper) == pytest.approx(0.05, abs=0.002)
     # Carried on one side only, it leans on the table somewhere.
     one_side = is_upper | (points[:, 0] > 0.5)
-    assert _support_height(points[one_side], is_upper[one_side]) == 0
-    assert _support_height(points[is_upper], np.ones(is_upper.sum(), bool)) == 0
+    assert support_height(points[one_side], is_upper[one_side]) == 0
+    assert support_height(points[is_upper], np.ones(is_upper.sum(), bool)) == 0
 
 
 @pytest.mark.parametrize("meshes", [(), (box((0.05, 0.05, 0.05), x=0.6),)])

@@ -57,7 +57,7 @@ def planner():
 @pytest.fixture(scope="module")
 def start(planner):
     """A posture over the bin, with something in the gripper."""
-    return planner._over_bin[0]
+    return planner.postures_over_bin[0]
 
 
 def test_phases_follow_each_other_from_the_start_to_home(planner, start):

@@ -23,7 +23,7 @@ def over_bin():
     import mujoco
 
     scene = make_scene(SceneConfig(scene="empty"))
-    posture = Planner()._over_bin[0]
+    posture = Planner().postures_over_bin[0]
     scene.data.qpos[:6] = posture
     mujoco.mj_forward(scene.model, scene.data)
     with CameraRig(scene.model, camera_preset("sr")) as rig:
