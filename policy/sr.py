@@ -1,12 +1,14 @@
 """The learnt policy: the SR network behind the protocol of all policies."""
 
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from policy.actions import ActionCandidates, ActionDecoding, ActionScores
-from policy.network.batch import collate, make_sample
+from policy.explanation import PolicyExplanation
+from policy.network.batch import SRBatch, choose_points, collate, make_sample
 from policy.network.checkpoint import load_checkpoint
 from policy.network.config import SRConfig
 from policy.network.model import SRNetwork
@@ -29,20 +31,25 @@ class SRPolicy:
         self.network = network.eval()
 
     @classmethod
-    def from_checkpoint(cls, path: Path) -> "SRPolicy":
+    def from_checkpoint(
+        cls, path: Path, *, encoder: str | Collection[str] | None = None
+    ) -> "SRPolicy":
         """Load trained weights.
 
         Args:
             path: File of the weights, with its card beside it.
+            encoder: Fingerprint of the encoder whose features it will get, or several that stand
+                for it; None to take any.
 
         Returns:
             The policy.
 
         Raises:
             MissingCheckpointError: If the weights or their card are missing.
-            InvalidCheckpointError: If they can't be read or don't fit.
+            InvalidCheckpointError: If they can't be read or don't fit, or were trained on another
+                encoder's features.
         """
-        return cls(load_checkpoint(path))
+        return cls(load_checkpoint(path, encoder=encoder))
 
     @classmethod
     def untrained(cls, config: SRConfig, rng: np.random.Generator) -> "SRPolicy":
@@ -76,11 +83,9 @@ class SRPolicy:
             InvalidArrayError: If the features have another size than the network's.
         """
         del rng
-        sample = make_sample(observation, candidates, self.network.config)
         num_candidates = len(candidates)
-        device = next(self.network.parameters()).device
         with torch.inference_mode():
-            output = self.network(collate([sample]).to(device))
+            output = self.network(self._batch(observation, candidates))
         # The batch has one row of padding if there are no candidates.
         rows = {
             "logits": output.logits,
@@ -91,3 +96,38 @@ class SRPolicy:
         arrays = {name: rows[name][0, :num_candidates].cpu().numpy() for name in rows}
         logits = arrays.pop("logits")
         return ActionScores(logits=logits, decoding=ActionDecoding(**arrays))
+
+    def explain(self, observation: Observation, candidates: ActionCandidates) -> PolicyExplanation:
+        """Repeat a decision and show what it attended to.
+
+        Args:
+            observation: The scene's feature cloud and the instruction.
+            candidates: K candidates; K may be 0.
+
+        Returns:
+            The semantic mask on the M points that the network looks at, alpha of every layer of
+            dense-sparse self-attention, and the candidates' logits.
+
+        Raises:
+            InvalidArrayError: If the features have another size than the network's.
+        """
+        chosen = choose_points(observation, self.network.config)
+        batch = self._batch(observation, candidates, chosen)
+        with torch.inference_mode():
+            mask = self.network.semantic_mask(batch)[0, :, : len(chosen)]
+            alpha, logits = self.network.alpha(), self.network(batch).logits[0, : len(candidates)]
+        return PolicyExplanation(
+            points=observation.points[chosen],
+            mask=mask.cpu().numpy(),
+            alpha=alpha.cpu().numpy(),
+            logits=logits.cpu().numpy(),
+        )
+
+    def _batch(
+        self,
+        observation: Observation,
+        candidates: ActionCandidates,
+        chosen: np.ndarray | None = None,
+    ) -> SRBatch:
+        sample = make_sample(observation, candidates, self.network.config, chosen=chosen)
+        return collate([sample]).to(next(self.network.parameters()).device)

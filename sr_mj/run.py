@@ -23,8 +23,10 @@ from sr_mj.errors import ConfigError
 
 if TYPE_CHECKING:
     from perception.lifter import MultiViewLifter
+    from policy.base import Policy
+    from sr_mj.explain import Explainer
     from sr_mj.perturbation import PosePerturbation
-    from sr_mj.scene import SceneConfig
+    from sr_mj.scene import Scene, SceneConfig
 
 MAX_ATTEMPTS = 100
 
@@ -72,6 +74,10 @@ class RunConfig:
     """Camera preset: sr or a2."""
     out: Path | None = None
     """New folder for configuration, versions, attempts as JSON, and pictures."""
+    explain: Path | None = None
+    """Folder for pictures of what a policy with attention (sr) attended to at every attempt: the
+    semantic mask, the weights of the two branches in each layer, and the candidates' scores. May
+    be the folder of --out."""
     record: Path | None = None
     """Video of the arm, .mp4 or .gif, at twice the real speed."""
     allow_download: bool = False
@@ -86,14 +92,11 @@ def _check(config: RunConfig) -> None:
     """Refuse what can be refused before anything heavy is loaded."""
     if not 1 <= config.attempts <= MAX_ATTEMPTS:
         raise ConfigError(f"Attempts is {config.attempts}; expected 1 to {MAX_ATTEMPTS}.")
-    if (
-        config.out is not None
-        and config.out.exists()
-        and (not config.out.is_dir() or any(config.out.iterdir()))
-    ):
-        raise ConfigError(
-            f"Output folder {str(config.out)!r} exists and is not empty; choose a new one."
-        )
+    for folder in filter(None, (config.out, config.explain)):
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise ConfigError(
+                f"Output folder {str(folder)!r} exists and is not empty; choose a new one."
+            )
 
 
 def _scene_configs(config: RunConfig) -> "tuple[SceneConfig, ...]":
@@ -156,6 +159,7 @@ def run(config: RunConfig) -> int:
     select_backend()
     from sr_mj.assemble import check_policy_name, lifter_for
     from sr_mj.candidates.external import check_generator_name
+    from sr_mj.explain import check_explains
     from sr_mj.video import check_video_path
 
     # Mistakes first: nothing is made before every name is known to exist.
@@ -163,6 +167,8 @@ def run(config: RunConfig) -> int:
     _perturbation(config)
     check_policy_name(config.policy)
     check_generator_name(config.generator)
+    if config.explain is not None:
+        check_explains(config.policy)
     if config.record is not None:
         check_video_path(config.record)
     lifter = lifter_for(
@@ -192,11 +198,13 @@ def _run_episode(
     generator = load_generator(config.generator)
     scene = make_scene(scene_config)
     policy = make_policy(config.policy, scene, config.checkpoint)
-    out, record = config.out, config.record
+    out, record, explain = config.out, config.record, config.explain
     if is_one_of_many:
         out = out and out / scene_config.title
+        explain = explain and explain / scene_config.title
         record = record and record.with_stem(f"{record.stem}-{scene_config.title}")
     reporter = Reporter(config, scene, out)
+    explainer = _explainer(policy, scene, explain)
     reporter.begin()
     with contextlib.ExitStack() as stack:
         film = record and stack.enter_context(VideoRecorder(scene, record))
@@ -213,8 +221,20 @@ def _run_episode(
         )
         for attempt in run_episode(scene, pipeline, seed=config.seed, max_attempts=config.attempts):
             reporter.add(attempt)
+            if explainer is not None:
+                explainer.add(attempt)
     reporter.finish(time.perf_counter() - start)
     return has_succeeded(scene, reporter.attempts)
+
+
+def _explainer(policy: "Policy", scene: "Scene", folder: Path | None) -> "Explainer | None":
+    from policy.explanation import ExplainingPolicy
+    from sr_mj.explain import Explainer
+
+    if folder is None:
+        return None
+    assert isinstance(policy, ExplainingPolicy), "check_explains lets no other policy through"
+    return Explainer(policy, scene, folder)
 
 
 def main() -> None:

@@ -3,7 +3,7 @@
 import math
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from policy.network.attention import (
@@ -13,16 +13,20 @@ from policy.network.attention import (
     scaled_scores,
     split_heads,
 )
+from policy.network.batch import PHASES, SRBatch
+from policy.network.bias import CandidateBias, candidate_basis
 from policy.network.config import SRConfig
 from policy.network.encoding import fourier_features, mlp, num_fourier_features
 
 # Score that a cosine similarity of 1 starts with in the semantic mask. CLIP's own temperature
-# would be 100, a mask of a few points; 10 lets the usual spread of similarities in a cloud, 0.1,
-# change a point's weight by e.
-_INITIAL_SHARPNESS = 10.0
-# Advantage of the pooled embedding over a token in the mask at the start: about half of all
-# weight in an instruction of seven tokens.
+# would be 100; but a head sees a random part of the channels, and its cosine is off by up to 0.2.
+_INITIAL_SHARPNESS = 5.0
+# Advantage of a pooled embedding, of the sentence or of the phrase, over a token in the mask at
+# the start: about two thirds of all weight in an instruction of seven tokens.
 _INITIAL_POOLED_ADVANTAGE = 2.0
+# Score at the start of the point most similar to the phrase over the least similar one: it fits
+# e^8 = 3000 times as well, which the cosine adds to.
+_INITIAL_SIMILARITY_SHARPNESS = 8.0
 
 
 class LanguageAlignment(nn.Module):
@@ -45,8 +49,14 @@ class LanguageAlignment(nn.Module):
         self.query = nn.Linear(feature_dim, width)
         self.key = nn.Linear(feature_dim, width, bias=False)
         self.token_weight = nn.Linear(feature_dim, config.num_heads, bias=False)
+        # One row for the sentence and, if it is used, one for the phrase.
         self.pooled_advantage = nn.Parameter(
-            torch.full((config.num_heads,), _INITIAL_POOLED_ADVANTAGE)
+            torch.full((2 if config.phrase else 1, config.num_heads), _INITIAL_POOLED_ADVANTAGE)
+        )
+        self.similarity_sharpness = (
+            nn.Parameter(torch.full((config.num_heads,), _INITIAL_SIMILARITY_SHARPNESS))
+            if config.similarity
+            else None
         )
         self.value = nn.Linear(width, width)
         self.out = nn.Linear(width, width)
@@ -67,37 +77,32 @@ class LanguageAlignment(nn.Module):
         nn.init.zeros_(self.query.bias)
         nn.init.zeros_(self.token_weight.weight)
 
-    def gate(
-        self,
-        features: Float[Tensor, "batch points channels"],
-        point_mask: Bool[Tensor, "batch points"],
-        tokens: Float[Tensor, "batch tokens channels"],
-        token_mask: Bool[Tensor, "batch tokens"],
-        pooled: Float[Tensor, "batch channels"],
-    ) -> Float[Tensor, "batch heads points"]:
+    def gate(self, batch: SRBatch) -> Float[Tensor, "batch heads points"]:
         """The semantic mask.
 
+        The features of the whole sentence and of the phrase join the tokens as two more, because
+        in CLIP they alone were trained to lie near image features.
+
         Args:
-            features: Visual features of the points.
-            point_mask: True for real points.
-            tokens: Features of the instruction's tokens.
-            token_mask: True for real tokens.
-            pooled: Feature of the whole instruction. It joins the tokens as one more, because in
-                CLIP it alone was trained to lie near image features.
+            batch: Decisions; their candidates are not looked at.
 
         Returns:
             A gate for each head and point, of mean 1 over the real points and 0 on padding.
         """
-        language = torch.cat([tokens, pooled[:, None]], dim=1)
-        language_mask = nn.functional.pad(token_mask, (0, 1), value=True)
+        pooled = torch.stack([batch.pooled, batch.phrase][: len(self.pooled_advantage)], dim=1)
+        language = torch.cat([batch.tokens, pooled], dim=1)
+        language_mask = nn.functional.pad(batch.token_mask, (0, pooled.shape[1]), value=True)
         q = split_heads(self.query(language), self.num_heads)
-        k = split_heads(self.key(features), self.num_heads)
-        attention = masked_softmax(scaled_scores(q, k), point_mask[:, None, None])  # eq. (4)
-        token_scores = self.token_weight(language).transpose(1, 2)
-        is_pooled = torch.arange(language.shape[1], device=language.device) == tokens.shape[1]
-        token_scores = token_scores + self.pooled_advantage[:, None] * is_pooled
+        k = split_heads(self.key(batch.features), self.num_heads)
+        scores = scaled_scores(q, k)
+        if self.similarity_sharpness is not None:
+            similarity = scaled_similarity(batch.similarity, batch.point_mask)
+            scores = scores + (self.similarity_sharpness[:, None] * similarity[:, None])[:, :, None]
+        attention = masked_softmax(scores, batch.point_mask[:, None, None])  # eq. (4)
+        advantage = nn.functional.pad(self.pooled_advantage.T, (batch.tokens.shape[1], 0))
+        token_scores = self.token_weight(language).transpose(1, 2) + advantage
         weights = masked_softmax(token_scores, language_mask[:, None])
-        num_points = point_mask.sum(dim=-1)[:, None, None]
+        num_points = batch.point_mask.sum(dim=-1)[:, None, None]
         # Each row of the attention sums to 1, so the number of points makes the mean 1.
         return (weights[:, :, None] @ attention).squeeze(2) * num_points
 
@@ -120,6 +125,40 @@ class LanguageAlignment(nn.Module):
         return self.norm(x + self.out(merge_heads(values * gate[..., None])))
 
 
+class PointwiseLanguageAttention(nn.Module):
+    """The other reading of stage 1: every point asks, and gathers from all of the language."""
+
+    def __init__(self, config: SRConfig) -> None:
+        """Make the stage.
+
+        Args:
+            config: Size of the network.
+        """
+        super().__init__()
+        self.uses_phrase = config.phrase
+        self.language = nn.Linear(config.feature_dim, config.width)
+        self.attention = MultiHeadAttention(config.width, config.num_heads)
+        self.norm = nn.LayerNorm(config.width)
+
+    def forward(
+        self, x: Float[Tensor, "batch points width"], batch: SRBatch
+    ) -> Float[Tensor, "batch points width"]:
+        """Add to every point what it finds in the language.
+
+        Args:
+            x: Point features, projected to the network's width.
+            batch: Decisions.
+
+        Returns:
+            V_align, one row a point.
+        """
+        pooled = torch.stack([batch.pooled, batch.phrase][: 1 + self.uses_phrase], dim=1)
+        language = self.language(torch.cat([batch.tokens, pooled], dim=1))
+        mask = nn.functional.pad(batch.token_mask, (0, pooled.shape[1]), value=True)
+        weights = self.attention.weights(x, language, mask)
+        return self.norm(x + self.attention.gather(weights, language))
+
+
 class ActionAlignment(nn.Module):
     """Stage 2 (2-Align): every candidate gathers what the points around it mean (eq. 6)."""
 
@@ -136,42 +175,66 @@ class ActionAlignment(nn.Module):
         width = config.width
         query_in = 7 + (num_fourier if self.query_fourier else 0)
         self.query_mlp = mlp(query_in, width, width, width)
-        self.phase = nn.Embedding(2, width)
+        self.phase = nn.Embedding(len(PHASES), width)
+        self.num_bias_scales = config.num_bias_scales
+        self.bias = (
+            CandidateBias(len(PHASES), config.num_heads, config.num_bias_scales)
+            if config.candidate_bias
+            else None
+        )
         self.key_mlp = mlp(config.feature_dim + num_fourier, width, width)
         self.attention = MultiHeadAttention(width, config.num_heads)
         self.norm = nn.LayerNorm(width)
 
     def forward(
         self,
-        poses: Float[Tensor, "batch candidates 7"],
-        phase: Tensor,
-        positions: Float[Tensor, "batch points 3"],
-        features: Float[Tensor, "batch points channels"],
+        batch: SRBatch,
+        phase: Int[Tensor, " batch"],
         values: Float[Tensor, "batch points width"],
-        point_mask: Bool[Tensor, "batch points"],
-    ) -> Float[Tensor, "batch candidates width"]:
+        mask: Float[Tensor, "batch heads points"],
+    ) -> tuple[Float[Tensor, "batch candidates width"], Float[Tensor, "batch heads candidates"]]:
         """Align candidates with the cloud.
 
         Args:
-            poses: Candidates: normalised position and quaternion x, y, z, w.
-            phase: (batch,) 0 for pick, 1 for place.
-            positions: Normalised positions of the points.
-            features: Visual features of the points, as they came.
-            values: V_align, what stage 1 made of them.
-            point_mask: True for real points.
+            batch: Decisions; keys are made of their visual features as they came.
+            phase: Index into `PHASES`.
+            values: V_align, what stage 1 made of the points.
+            mask: The semantic mask.
 
         Returns:
-            A state for each candidate.
+            A state for each candidate, and what each head sees of log(1 + mask).
         """
-        pose_inputs = poses
+        pose_inputs, num_bands = batch.poses, self.num_bands
         if self.query_fourier:
             # Departure from 3.3.1, which embeds the seven numbers alone: attention compares a
             # candidate's position with those of the points, and a product of the same waves on
             # both sides is a function of their difference; an MLP would first have to learn them.
-            waves = fourier_features(poses[..., :3], self.num_bands)
-            pose_inputs = torch.cat([poses, waves], dim=-1)
+            waves = fourier_features(batch.poses[..., :3], num_bands)
+            pose_inputs = torch.cat([pose_inputs, waves], dim=-1)
         queries = self.query_mlp(pose_inputs) + self.phase(phase)[:, None]
-        visual_position = torch.cat([features, fourier_features(positions, self.num_bands)], dim=-1)
-        keys = self.key_mlp(visual_position)
-        aligned = self.attention(queries, keys, values, point_mask)  # eq. (6)
-        return self.norm(queries + aligned)
+        waves = fourier_features(batch.positions, num_bands)
+        keys = self.key_mlp(torch.cat([batch.features, waves], dim=-1))
+        bias = None
+        if self.bias is not None:
+            basis = candidate_basis(batch.poses, batch.positions, phase > 0, self.num_bias_scales)
+            bias = self.bias(basis, phase)
+        weights = self.attention.weights(queries, keys, batch.point_mask, bias)  # eq. (6)
+        # A mask of mean 1 over hundreds of points reaches far beyond 1; its logarithm is close to
+        # the score that made it.
+        readout = (weights @ mask.log1p()[..., None].to(weights.dtype)).squeeze(-1)
+        return self.norm(queries + self.attention.gather(weights, values)), readout
+
+
+def scaled_similarity(
+    similarity: Float[Tensor, "batch points"], mask: Bool[Tensor, "batch points"]
+) -> Float[Tensor, "batch points"]:
+    """Similarity scaled to span 0 to 1 over the real points; what lies on padding is finite.
+
+    Similarities of one encoder lie within a tenth of one another, those of another fill 0 to 1.
+    """
+    lowest = similarity.masked_fill(~mask, float("inf")).amin(dim=-1, keepdim=True)
+    highest = similarity.masked_fill(~mask, float("-inf")).amax(dim=-1, keepdim=True)
+    shifted = (similarity - lowest).masked_fill(~mask, 0.0)
+    return shifted / (highest - lowest).masked_fill(~mask.any(dim=-1, keepdim=True), 1.0).clamp(
+        min=1e-6
+    )

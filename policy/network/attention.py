@@ -61,26 +61,42 @@ class MultiHeadAttention(nn.Module):
         self.value = nn.Linear(width, width)
         self.out = nn.Linear(width, width)
 
-    def forward(
+    def weights(
         self,
         queries: Float[Tensor, "batch queries width"],
         keys: Float[Tensor, "batch keys width"],
-        values: Float[Tensor, "batch keys width"],
         key_mask: Bool[Tensor, "batch keys"],
-    ) -> Float[Tensor, "batch queries width"]:
-        """Let every query gather values.
+        bias: Float[Tensor, "batch heads queries keys"] | None = None,
+    ) -> Float[Tensor, "batch heads queries keys"]:
+        """Attention of every query on the keys.
 
         Args:
             queries: What asks.
             keys: What is compared with the queries.
-            values: What is gathered.
             key_mask: True for real keys, False for padding.
+            bias: Added to the scores.
+
+        Returns:
+            Rows that sum to 1, or to 0 where no key is valid.
+        """
+        q = split_heads(self.query(queries), self.num_heads)
+        k = split_heads(self.key(keys), self.num_heads)
+        scores = scaled_scores(q, k)
+        return masked_softmax(scores if bias is None else scores + bias, key_mask[:, None, None])
+
+    def gather(
+        self,
+        weights: Float[Tensor, "batch heads queries keys"],
+        values: Float[Tensor, "batch keys width"],
+    ) -> Float[Tensor, "batch queries width"]:
+        """Let every query gather values.
+
+        Args:
+            weights: From `weights`.
+            values: What is gathered.
 
         Returns:
             One row for each query; zeros plus the output bias where no key is valid.
         """
-        q = split_heads(self.query(queries), self.num_heads)
-        k = split_heads(self.key(keys), self.num_heads)
         v = split_heads(self.value(values), self.num_heads)
-        weights = masked_softmax(scaled_scores(q, k), key_mask[:, None, None])
         return self.out(merge_heads(weights @ v))

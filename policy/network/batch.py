@@ -8,12 +8,15 @@ import torch
 from jaxtyping import Int
 from torch import Tensor
 
-from policy.actions import ACTION_KINDS, ActionCandidates
-from policy.arrays import checked_array
+from policy.actions import ActionCandidates
+from policy.arrays import check_range, checked_array
 from policy.errors import InvalidArrayError
 from policy.network.config import SRConfig
 from policy.network.selection import select_points
 from policy.observation import Observation
+
+PHASES = ("pick", "place", "place inside", "place outside")
+"""What is to be chosen; "place" alone where the instruction's relation was not understood."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +29,10 @@ class SRSample:
         similarity: (N,) float32 similarity to the instruction.
         tokens: (T, C) float32 features of the instruction's tokens.
         pooled: (C,) float32 feature of the whole instruction.
+        phrase: (C,) float32 feature of the phrase that the similarity looks for.
         poses: (K, 7) float32 candidates: normalised position, quaternion x, y, z, w.
-        phase: 0 for pick, 1 for place.
+        prior: (K,) float32 geometric quality, 0 (bad) to 1 (good).
+        phase: Index into `PHASES`.
 
     Raises:
         InvalidArrayError: If a field has a wrong shape or value, or the fields don't fit.
@@ -38,7 +43,9 @@ class SRSample:
     similarity: np.ndarray
     tokens: np.ndarray
     pooled: np.ndarray
+    phrase: np.ndarray
     poses: np.ndarray
+    prior: np.ndarray
     phase: int
 
     def __post_init__(self) -> None:
@@ -50,13 +57,17 @@ class SRSample:
             "similarity": ("N",),
             "tokens": ("T", "C"),
             "pooled": ("C",),
+            "phrase": ("C",),
             "poses": ("K", 7),
+            "prior": ("K",),
         }
         for name, shape in shapes.items():
             array = checked_array(name, getattr(self, name), shape, sizes=sizes)
             object.__setattr__(self, name, array)
-        if self.phase not in range(len(ACTION_KINDS)):
-            raise InvalidArrayError(f"phase: got {self.phase!r}, expected 0 (pick) or 1 (place).")
+        check_range("prior", self.prior, 0.0, 1.0)
+        if self.phase not in range(len(PHASES)):
+            names = ", ".join(f"{i} ({name})" for i, name in enumerate(PHASES))
+            raise InvalidArrayError(f"phase: got {self.phase!r}, expected one of {names}.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,9 +82,11 @@ class SRBatch:
         tokens: (B, T, C) token features.
         token_mask: (B, T) True for real tokens.
         pooled: (B, C) feature of the instruction.
+        phrase: (B, C) feature of the phrase that is looked for.
         poses: (B, K, 7) normalised candidates.
+        prior: (B, K) geometric quality of the candidates.
         candidate_mask: (B, K) True for real candidates.
-        phase: (B,) int64, 0 for pick and 1 for place.
+        phase: (B,) int64, index into `PHASES`.
     """
 
     positions: Tensor
@@ -83,7 +96,9 @@ class SRBatch:
     tokens: Tensor
     token_mask: Tensor
     pooled: Tensor
+    phrase: Tensor
     poses: Tensor
+    prior: Tensor
     candidate_mask: Tensor
     phase: Tensor
 
@@ -111,7 +126,11 @@ class SRBatch:
 
 
 def make_sample(
-    observation: Observation, candidates: ActionCandidates, config: SRConfig
+    observation: Observation,
+    candidates: ActionCandidates,
+    config: SRConfig,
+    *,
+    chosen: Int[np.ndarray, " M"] | None = None,
 ) -> SRSample:
     """Thin the cloud and normalise positions to the workspace.
 
@@ -119,6 +138,8 @@ def make_sample(
         observation: The scene's feature cloud and the instruction.
         candidates: K candidates.
         config: Limits the points and says which to take.
+        chosen: Indices of the points to take instead, such as those of an earlier call of
+            `choose_points`.
 
     Returns:
         The decision as the network takes it.
@@ -131,14 +152,12 @@ def make_sample(
             f"features: got {observation.feature_dim} channels, expected {config.feature_dim} as "
             "in the network. Use the encoder that the network was trained with."
         )
-    chosen = select_points(
-        observation.points,
-        observation.similarity,
-        max_points=config.max_points,
-        method=config.point_selection,
-    )
+    if chosen is None:
+        chosen = choose_points(observation, config)
     center = (observation.workspace_max + observation.workspace_min) / 2
     half = (observation.workspace_max - observation.workspace_min) / 2
+    phrase = observation.phrase_pooled
+    side = observation.side if candidates.kind == "place" else None
     poses = candidates.as_pose7()
     poses[:, :3] = (candidates.positions - center) / half
     return SRSample(
@@ -147,8 +166,28 @@ def make_sample(
         similarity=observation.similarity[chosen],
         tokens=observation.text_tokens,
         pooled=observation.text_pooled,
+        phrase=observation.text_pooled if phrase is None else phrase,
         poses=poses,
-        phase=ACTION_KINDS.index(candidates.kind),
+        prior=candidates.prior,
+        phase=PHASES.index(" ".join((candidates.kind, *filter(None, [side])))),
+    )
+
+
+def choose_points(observation: Observation, config: SRConfig) -> Int[np.ndarray, " M"]:
+    """Choose the points of a cloud that the network gets to see.
+
+    Args:
+        observation: The scene's feature cloud.
+        config: Limits the points and says which to take.
+
+    Returns:
+        Their indices.
+    """
+    return select_points(
+        observation.points,
+        observation.similarity,
+        max_points=config.max_points,
+        method=config.point_selection,
     )
 
 
@@ -180,7 +219,9 @@ def collate(samples: Sequence[SRSample]) -> SRBatch:
         tokens=tokens,
         token_mask=token_mask,
         pooled=torch.from_numpy(np.stack([sample.pooled for sample in samples])),
+        phrase=torch.from_numpy(np.stack([sample.phrase for sample in samples])),
         poses=poses,
+        prior=pad([sample.prior for sample in samples])[0],
         candidate_mask=candidate_mask,
         phase=torch.tensor([sample.phase for sample in samples]),
     )

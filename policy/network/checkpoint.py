@@ -1,10 +1,13 @@
 """Weights of the network on disk: safetensors, and a JSON card that says what they are."""
 
 import json
+import os
+from collections.abc import Callable, Collection
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
@@ -15,34 +18,57 @@ from policy.network.model import SRNetwork
 _FORMAT = 1
 
 
-def save_checkpoint(path: Path, network: SRNetwork, training: dict[str, Any]) -> None:
-    """Write weights and card.
+def save_checkpoint(
+    path: Path,
+    network: SRNetwork,
+    training: dict[str, Any],
+    *,
+    encoder: str | None = None,
+    half: bool = False,
+) -> None:
+    """Write weights and card; each file appears complete or not at all.
 
     Args:
         path: File of the weights, ending in .safetensors; the card goes beside it with .json.
         network: The network.
-        training: What a reader must know of the training: data, encoder, epochs, seed, losses.
+        training: What a reader must know of the training: data, epochs, seed, losses, versions.
             JSON values.
+        encoder: Fingerprint of the encoder whose features the network was trained on; None for one
+            that is not trained.
+        half: Write half precision, which takes half the space; loading gives single precision.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    weights = {name: tensor.contiguous().cpu() for name, tensor in network.state_dict().items()}
-    save_file(weights, path)
-    card = {"format": _FORMAT, "config": asdict(network.config), "training": training}
-    path.with_suffix(".json").write_text(json.dumps(card, indent=2, sort_keys=True) + "\n")
+    dtype = torch.float16 if half else torch.float32
+    weights = {
+        name: (tensor.to(dtype) if tensor.is_floating_point() else tensor).contiguous().cpu()
+        for name, tensor in network.state_dict().items()
+    }
+    card = {
+        "format": _FORMAT,
+        "config": asdict(network.config),
+        "encoder": encoder,
+        "training": training,
+    }
+    text = json.dumps(card, indent=2, sort_keys=True) + "\n"
+    _replace(path, lambda part: save_file(weights, part))
+    _replace(path.with_suffix(".json"), lambda part: part.write_text(text))
 
 
-def load_checkpoint(path: Path) -> SRNetwork:
+def load_checkpoint(path: Path, *, encoder: str | Collection[str] | None = None) -> SRNetwork:
     """Read weights and card.
 
     Args:
         path: File of the weights; the card must lie beside it with the suffix .json.
+        encoder: Fingerprint of the encoder whose features the network will get, or several that
+            stand for it, such as those of its precisions; None to take any.
 
     Returns:
-        The network in evaluation mode, on the CPU.
+        The network in evaluation mode, on the CPU, in single precision.
 
     Raises:
         MissingCheckpointError: If either file is missing.
-        InvalidCheckpointError: If the card or the weights don't fit this version.
+        InvalidCheckpointError: If the card or the weights don't fit this version, or were trained
+            on another encoder's features.
     """
     card_path = path.with_suffix(".json")
     missing = [str(p) for p in (path, card_path) if not p.is_file()]
@@ -51,7 +77,15 @@ def load_checkpoint(path: Path) -> SRNetwork:
             f"No weights for the policy 'sr': missing {' and '.join(missing)}. Pass "
             "checkpoint=FILE.safetensors, or use the policy 'grounding', which needs no weights."
         )
-    network = SRNetwork(_read_config(card_path))
+    config, trained_on = _read_card(card_path)
+    accepted = (encoder,) if isinstance(encoder, str) else encoder
+    if accepted is not None and trained_on is not None and trained_on not in accepted:
+        raise InvalidCheckpointError(
+            f"{path}: got weights trained on features of the encoder {trained_on}, expected "
+            f"{' or '.join(accepted)}, which is in use. Choose the encoder that they were trained "
+            "with, or train anew with python -m policy.train on demonstrations of this one."
+        )
+    network = SRNetwork(config)
     try:
         network.load_state_dict(load_file(path))
     except (SafetensorError, RuntimeError) as error:
@@ -63,7 +97,18 @@ def load_checkpoint(path: Path) -> SRNetwork:
     return network.eval()
 
 
-def _read_config(card_path: Path) -> SRConfig:
+def _replace(path: Path, write: Callable[[Path], object]) -> None:
+    part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        write(part)
+        # safetensors writes files that only their owner can read.
+        part.chmod(0o644)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _read_card(card_path: Path) -> tuple[SRConfig, str | None]:
     try:
         card = json.loads(card_path.read_text())
         if card["format"] != _FORMAT:
@@ -71,7 +116,7 @@ def _read_config(card_path: Path) -> SRConfig:
                 f"{card_path}: got format {card['format']!r}, expected {_FORMAT}. "
                 "Save the weights again with this version."
             )
-        return SRConfig(**card["config"])
+        return SRConfig(**card["config"]), card.get("encoder")
     except (json.JSONDecodeError, KeyError, TypeError, InvalidConfigError) as error:
         raise InvalidCheckpointError(
             f"{card_path}: got a card that can't be read ({type(error).__name__}: {error}), "

@@ -8,6 +8,7 @@ from policy.errors import InvalidConfigError
 Sparsifier = Literal["relu2", "relu", "softmax"]
 SelfAttention = Literal["diagonal", "full"]
 PointSelection = Literal["balanced", "similar"]
+LanguageAttention = Literal["gate", "points"]
 Ablation = Literal["base", "sr_a", "sr"]
 
 
@@ -19,8 +20,28 @@ class SRConfig:
         feature_dim: Channels C of the visual and text features.
         width: Width D of the network; 512 as in section 3.3.1 (A2 uses 768).
         num_heads: Attention heads.
+        prior: Add the candidate generator's prior to the logit, times a learnt weight. Departure:
+            a pose alone does not tell whether the fingers meet the surface squarely or have room;
+            the generator measured both.
+        phrase: Give stage 1 the feature of the phrase that is looked for besides those of the
+            sentence. Departure: it leaves out what the sentence says of the other phase.
+        side: Tell the network whether a place is asked for inside or around the reference.
+            Departure: the parser knows it, and few demonstrations would have to teach it.
+        similarity: Give the semantic mask the points' similarity to that phrase as one more
+            score. Departure: it is relative to what everything resembles, which the cosine in
+            eq. (4) is not, and the zero-shot policy lives by it; so the network starts there.
+        candidate_bias: Bias of stage 2 by where a point lies relative to a candidate. Departure:
+            half of the heads start by looking at what is at the candidate, which content-based
+            attention would have to learn from few demonstrations.
+        mask_readout: Add to the logit, with learnt weights, what the heads of stage 2 see of the
+            semantic mask. Departure: otherwise a whole network lies between the mask and the
+            score, and only training could tell it that a large value is good. Without stage 1
+            there is no mask, and the points' similarity takes its place.
         one_align: Stage 1, language to vision. Without it (BASE), stage 2 works on the visual
             features themselves.
+        language_attention: "gate": the language asks, and its attention is a mask on the points.
+            "points": every point asks and gathers from the language; there is no mask, and
+            `mask_readout` reads the similarity.
         dssa: Dense-sparse self-attention after stage 1. Without it, the network is SR-A.
         num_dssa_layers: DSSA layers. Section 3.3.2 speaks of layer-wise weights without a count;
             two is the least for which that means something.
@@ -32,7 +53,7 @@ class SRConfig:
             keys have. Off, the query sees the bare seven numbers, as the paper writes it.
         num_fourier_bands: Octaves of the Fourier features. Six give a shortest wavelength of
             1/16 of the workspace's width, 28 mm in the standard one: about a finger's width.
-        num_bias_scales: Scales of the relative position bias.
+        num_bias_scales: Scales of both relative position biases.
         max_points: Points taken from a cloud of 1500-3000; attention is quadratic in them.
         point_selection: "balanced": half by similarity, half spread evenly. "similar": the most
             similar ones only, as A2 does.
@@ -47,7 +68,14 @@ class SRConfig:
     feature_dim: int
     width: int = 512
     num_heads: int = 8
+    prior: bool = True
+    phrase: bool = True
+    side: bool = True
+    similarity: bool = True
+    candidate_bias: bool = True
+    mask_readout: bool = True
     one_align: bool = True
+    language_attention: LanguageAttention = "gate"
     dssa: bool = True
     num_dssa_layers: int = 2
     sparsifier: Sparsifier = "relu2"
@@ -88,6 +116,7 @@ class SRConfig:
             ("sparsifier", get_args(Sparsifier)),
             ("self_attention", get_args(SelfAttention)),
             ("point_selection", get_args(PointSelection)),
+            ("language_attention", get_args(LanguageAttention)),
         ):
             if getattr(self, name) not in choices:
                 raise InvalidConfigError(
@@ -118,7 +147,8 @@ def ablation_switches(name: Ablation) -> dict[str, bool]:
         InvalidConfigError: If there is no such variant.
     """
     switches = {
-        "base": {"one_align": False, "dssa": False},
+        # What has no stage 1 has no mask to read out; it works on the same inputs otherwise.
+        "base": {"one_align": False, "dssa": False, "mask_readout": False},
         "sr_a": {"one_align": True, "dssa": False},
         "sr": {"one_align": True, "dssa": True},
     }

@@ -1,66 +1,83 @@
 """Dense-sparse self-attention over the points (section 3.3.2)."""
 
+import math
+
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from policy.network.attention import masked_softmax, merge_heads, scaled_scores, split_heads
+from policy.network.attention import merge_heads, split_heads
 from policy.network.bias import RelativePositionBias
 from policy.network.config import Sparsifier
 
+# Score of padding: far below any other, yet finite in half precision.
+_PADDING_SCORE = -3e4
 
-def dense_weights(
-    scores: Float[Tensor, "batch heads points points"],
-    bias: Float[Tensor, "batch heads points points"],
-    conv: nn.Module,
-    mask: Bool[Tensor, "batch points"],
-) -> Float[Tensor, "batch heads points points"]:
-    """Attention of the dense convolutional branch.
+
+def convolved_factors(
+    queries: Float[Tensor, "batch heads points head_dim"],
+    keys: Float[Tensor, "batch heads points head_dim"],
+    kernel: Float[Tensor, "heads 1 3 3"],
+) -> tuple[Tensor, Tensor]:
+    """Factors whose product is Conv(QKᵀ), a depthwise 3 x 3 convolution of the score map.
+
+    Scores are products of queries and keys, so that their convolution is a product too, of
+    neighbouring queries with mixtures of neighbouring keys:
+    Conv(S)_ij = Σ_a q_(i+a) · Σ_b w_ab k_(j+b). That replaces a convolution over N x N maps, the
+    slowest step on a CPU, by a longer inner product. Beyond the map's edge are zeros.
 
     Args:
-        scores: QKᵀ/√d with the points in Morton order.
-        bias: Relative position bias B.
-        conv: Convolution over the score map.
-        mask: True for real points.
+        queries: Queries, 0 on padding.
+        keys: Keys, 0 on padding.
+        kernel: Weights w of the convolution.
 
     Returns:
-        Weights whose rows sum to 1 over the real points.
+        Left and right factor, (batch, heads, points, 3 head_dim) each.
     """
-    # Padding must look like the zeros that the convolution sees beyond the map's edge.
-    is_pair = mask[:, None, :, None] & mask[:, None, None, :]
-    padded = scores * is_pair
-    # A depthwise convolution of so few channels is about ten times faster with them innermost.
-    convolved = conv(padded.contiguous(memory_format=torch.channels_last)).contiguous()
-    return masked_softmax(convolved + bias, mask[:, None, None])  # eq. (9)
+    batch, _, points, head_dim = keys.shape
+    left = torch.cat(_neighbours(queries), dim=-1)
+    # One small product for each head: (heads, b, everything else).
+    near = torch.stack(_neighbours(keys.transpose(0, 1)), dim=1).flatten(2)
+    right = torch.bmm(kernel.squeeze(1), near).unflatten(-1, (batch, points, head_dim))
+    return left, right.permute(2, 0, 3, 1, 4).flatten(-2)
 
 
-def sparse_weights(
-    scores: Float[Tensor, "batch heads points points"],
+def _neighbours(x: Float[Tensor, "batch heads points head_dim"]) -> list[Tensor]:
+    """Rows i - 1, i and i + 1 for every i; zeros beyond the ends."""
+    padded = nn.functional.pad(x, (0, 0, 1, 1))
+    num = x.shape[2]
+    return [padded[:, :, step : step + num] for step in range(3)]
+
+
+def biased_product(
+    left: Float[Tensor, "batch heads points channels"],
+    right: Float[Tensor, "batch heads points channels"],
     bias: Float[Tensor, "batch heads points points"],
-    mask: Bool[Tensor, "batch points"],
-    sparsifier: Sparsifier,
 ) -> Float[Tensor, "batch heads points points"]:
-    """Attention of the sparse branch.
+    """Left · rightᵀ + bias in one pass over the N x N map."""
+    shape = bias.shape
+    product = torch.baddbmm(
+        bias.flatten(0, 1), left.flatten(0, 1), right.flatten(0, 1).transpose(1, 2)
+    )
+    return product.view(shape)
+
+
+def sparsify(
+    biased: Float[Tensor, "batch heads points points"], sparsifier: Sparsifier
+) -> Float[Tensor, "batch heads points points"]:
+    """Activation of the sparse branch, on S + B.
 
     Args:
-        scores: QKᵀ/√d.
-        bias: Relative position bias B.
-        mask: True for real points.
+        biased: Scores with their bias.
         sparsifier: "relu2" (eq. 10), or one of table 4's other two.
 
     Returns:
-        Weights; those of padding are 0.
+        Weights, not normalised unless by the softmax.
     """
-    biased = scores + bias
     if sparsifier == "softmax":
-        return masked_softmax(biased, mask[:, None, None])
+        return biased.softmax(dim=-1)
     weights = biased.relu()
-    if sparsifier == "relu2":
-        weights = weights.square()  # eq. (10)
-    # Departure from eq. (10): divided by the number of points. Without a normalisation the sum
-    # over the points grows with their number, which varies from scene to scene.
-    num_points = mask.sum(dim=-1, keepdim=True).clamp(min=1)
-    return weights * (mask / num_points)[:, None, None]
+    return weights * weights if sparsifier == "relu2" else weights  # eq. (10)
 
 
 class DSSALayer(nn.Module):
@@ -111,11 +128,35 @@ class DSSALayer(nn.Module):
         Returns:
             Point features.
         """
-        q = split_heads(self.query(x), self.num_heads)  # eq. (7)
-        k = split_heads(self.key(x), self.num_heads)
-        v = split_heads(self.value(x), self.num_heads)
-        scores, bias = scaled_scores(q, k), self.bias(basis)  # eq. (8)
+        is_real = mask[:, None, :, None].to(x.dtype)
+        scale = 1 / math.sqrt(x.shape[-1] // self.num_heads)
+        q = split_heads(self.query(x), self.num_heads) * (is_real * scale)  # eq. (7)
+        k = split_heads(self.key(x), self.num_heads) * is_real
+        v = split_heads(self.value(x), self.num_heads) * is_real
+        bias = self.bias(basis)
         sparse, dense = self.alpha
-        weights = sparse * sparse_weights(scores, bias, mask, self.sparsifier)
-        weights = weights + dense * dense_weights(scores, bias, self.conv, mask)
-        return self.norm(x + self.out(merge_heads(weights @ v)))  # eq. (11)
+        y = sparse * self._sparse(q, k, v, bias, mask) + dense * self._dense(q, k, v, bias, mask)
+        return self.norm(x + self.out(merge_heads(y)))  # eq. (11)
+
+    def _dense(self, q: Tensor, k: Tensor, v: Tensor, bias: Tensor, mask: Tensor) -> Tensor:
+        """Softmax(Conv(QKᵀ/√d) + B) V, eq. (9)."""
+        left, right = convolved_factors(q, k, self.conv.weight)
+        left, right = _exclude_padding(left, right, mask)
+        return biased_product(left, right, bias).softmax(dim=-1) @ v
+
+    def _sparse(self, q: Tensor, k: Tensor, v: Tensor, bias: Tensor, mask: Tensor) -> Tensor:
+        """ReLU²(QKᵀ/√d + B) V, eq. (8) and (10)."""
+        if self.sparsifier == "softmax":
+            q, k = _exclude_padding(q, k, mask)
+            return sparsify(biased_product(q, k, bias), "softmax") @ v
+        # Departure from eq. (10): divided by the number of points. Without a normalisation the sum
+        # over the points grows with their number, which varies from scene to scene.
+        num_points = mask.sum(dim=-1).clamp(min=1)[:, None, None, None]
+        return sparsify(biased_product(q, k, bias), self.sparsifier) @ (v / num_points)
+
+
+def _exclude_padding(left: Tensor, right: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
+    """Add a channel to both factors that lowers the scores of padding in their product."""
+    penalty = (~mask).to(right.dtype)[:, None, :, None] * _PADDING_SCORE
+    penalty = penalty.expand(*right.shape[:3], 1)
+    return torch.cat([left, torch.ones_like(penalty)], -1), torch.cat([right, penalty], -1)

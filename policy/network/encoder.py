@@ -54,7 +54,8 @@ class FullSelfAttention(nn.Module):
         mask: Bool[Tensor, "batch candidates"],
     ) -> Float[Tensor, "batch candidates width"]:
         """Let the real candidates exchange information."""
-        return self.attention(states, states, states, mask)
+        weights = self.attention.weights(states, states, mask)
+        return self.attention.gather(weights, states)
 
 
 class EncoderLayer(nn.Module):

@@ -2,14 +2,20 @@
 
 from dataclasses import replace
 
+import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from policy.network.alignment import ActionAlignment, LanguageAlignment
+from policy.network.alignment import (
+    ActionAlignment,
+    LanguageAlignment,
+    PointwiseLanguageAttention,
+    scaled_similarity,
+)
 from policy.network.batch import SRBatch
 from policy.network.bias import position_basis
 from policy.network.config import SRConfig
-from policy.network.decoder import ActionDecoder, SROutput
+from policy.network.decoder import ActionDecoder, CandidateEvidence, SROutput
 from policy.network.dssa import DSSALayer
 from policy.network.encoder import EncoderLayer
 from policy.network.encoding import fourier_features, num_fourier_features
@@ -34,7 +40,7 @@ class SRNetwork(nn.Module):
         self.config = config
         width, num_heads = config.width, config.num_heads
         self.visual = nn.Linear(config.feature_dim, width)
-        self.language_alignment = LanguageAlignment(config) if config.one_align else None
+        self.language_alignment = _stage_1(config)
         self.dssa_layers = nn.ModuleList(
             DSSALayer(width, num_heads, config.num_bias_scales, config.sparsifier)
             for _ in range(config.num_dssa_layers if config.dssa else 0)
@@ -46,6 +52,7 @@ class SRNetwork(nn.Module):
             for _ in range(config.num_encoder_layers)
         )
         self.decoder = ActionDecoder(config)
+        self.evidence = CandidateEvidence(config)
 
     def forward(self, batch: SRBatch) -> SROutput:
         """Score the candidates of a batch of decisions.
@@ -60,49 +67,72 @@ class SRNetwork(nn.Module):
             # The convolution of eq. (9) needs rows and columns whose neighbours are neighbours in
             # space; the paper names no order.
             batch = batch.take_points(morton_order(batch.positions, batch.point_mask))
-        states = self.action_alignment(
-            batch.poses,
-            batch.phase,
-            batch.positions,
-            batch.features,
-            self._values(batch),
-            batch.point_mask,
-        )
+        phase = batch.phase if self.config.side else batch.phase.clamp(max=1)
+        mask = self.semantic_mask(batch)
+        states, readout = self.action_alignment(batch, phase, self._values(batch, mask), mask)
         waves = fourier_features(batch.poses[..., :3], self.config.num_fourier_bands)
         states = states + self.position(waves)
         for layer in self.encoder_layers:
             states = layer(states, batch.candidate_mask)
         output = self.decoder(states)
-        logits = output.logits.masked_fill(~batch.candidate_mask, float("-inf"))
-        return replace(output, logits=logits)
+        logits = output.logits + self.evidence(phase, batch.prior, readout)
+        return replace(output, logits=logits.masked_fill(~batch.candidate_mask, float("-inf")))
 
-    def _values(self, batch: SRBatch) -> Float[Tensor, "batch points width"]:
+    def semantic_mask(self, batch: SRBatch) -> Float[Tensor, "batch heads points"]:
+        """How much each point matters to the instruction.
+
+        Args:
+            batch: Decisions.
+
+        Returns:
+            The mask of stage 1, of mean 1 over the real points and 0 on padding. Without stage 1,
+            or where its points ask, the points' similarity, scaled alike, for every head.
+        """
+        if isinstance(self.language_alignment, LanguageAlignment):
+            return self.language_alignment.gate(batch)
+        relevance = _relevance(batch.similarity, batch.point_mask)
+        return relevance[:, None].expand(-1, self.config.num_heads, -1)
+
+    def alpha(self) -> Float[Tensor, "layers 2"]:
+        """Weights of the sparse and the dense branch of every DSSA layer (eq. 12)."""
+        rows = [layer.alpha for layer in self.dssa_layers if isinstance(layer, DSSALayer)]
+        return torch.stack(rows) if rows else torch.zeros(0, 2)
+
+    def _values(
+        self, batch: SRBatch, mask: Float[Tensor, "batch heads points"]
+    ) -> Float[Tensor, "batch points width"]:
         """V_align of eq. (6)."""
         x = self.visual(batch.features)
-        if self.language_alignment is None:
+        if isinstance(self.language_alignment, LanguageAlignment):
+            x = self.language_alignment(x, mask)
+        elif self.language_alignment is not None:
+            x = self.language_alignment(x, batch)
+        else:
             # BASE has no language of its own, so its scores could not depend on the instruction.
             # Its points are weighted by their similarity, the product that A2 uses.
-            return x * _relevance(batch.similarity, batch.point_mask)[..., None]
-        gate = self.language_alignment.gate(
-            batch.features, batch.point_mask, batch.tokens, batch.token_mask, batch.pooled
-        )
-        x = self.language_alignment(x, gate)
+            return x * mask[:, 0, :, None]
         if self.dssa_layers:
             basis = position_basis(batch.positions, self.config.num_bias_scales)
+            if torch.is_autocast_enabled(basis.device.type):
+                # Once, and not again in every layer.
+                basis = basis.to(torch.get_autocast_dtype(basis.device.type))
             for layer in self.dssa_layers:
                 x = layer(x, basis, batch.point_mask)
         return x
 
 
+def _stage_1(config: SRConfig) -> LanguageAlignment | PointwiseLanguageAttention | None:
+    if not config.one_align:
+        return None
+    if config.language_attention == "points":
+        return PointwiseLanguageAttention(config)
+    return LanguageAlignment(config)
+
+
 def _relevance(
     similarity: Float[Tensor, "batch points"], mask: Bool[Tensor, "batch points"]
 ) -> Float[Tensor, "batch points"]:
-    """Similarity shifted to a minimum of 0 and scaled to a mean of 1 over the real points.
-
-    CLIP's similarities lie within a tenth of one another; as they come, they would weight all
-    points alike.
-    """
-    lowest = similarity.masked_fill(~mask, float("inf")).amin(dim=-1, keepdim=True)
-    shifted = (similarity - lowest).masked_fill(~mask, 0.0)
-    mean = shifted.sum(dim=-1, keepdim=True) / mask.sum(dim=-1, keepdim=True).clamp(min=1)
-    return shifted / mean.clamp(min=1e-6)
+    """Similarity shifted to a minimum of 0 and scaled to a mean of 1 over the real points."""
+    scaled = scaled_similarity(similarity, mask)
+    mean = scaled.sum(dim=-1, keepdim=True) / mask.sum(dim=-1, keepdim=True).clamp(min=1)
+    return scaled / mean.clamp(min=1e-6)

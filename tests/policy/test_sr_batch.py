@@ -7,7 +7,7 @@ import torch
 
 from policy.actions import ActionCandidates
 from policy.errors import InvalidArrayError
-from policy.network.batch import collate, make_sample
+from policy.network.batch import choose_points, collate, make_sample
 
 
 def test_workspace_spans_minus_one_to_one(make_observation, make_config, rng) -> None:
@@ -58,6 +58,55 @@ def test_collate_pads_and_masks(
         np.testing.assert_array_equal(batch.tokens[i, : len(sample.tokens)], sample.tokens)
 
 
+@pytest.mark.parametrize(
+    ("kind", "changes", "phase"),
+    [
+        ("pick", {}, 0),
+        ("place", {"phase": "place"}, 1),
+        ("place", {"phase": "place", "relation": "into", "side": "inside"}, 2),
+        ("place", {"phase": "place", "relation": "near", "side": "outside"}, 3),
+    ],
+)
+def test_phase_tells_which_side_is_asked_for(
+    make_observation,
+    make_candidates,
+    make_config,
+    rng: np.random.Generator,
+    kind: str,
+    changes: dict[str, Any],
+    phase: int,
+) -> None:
+    observation = make_observation(rng, **changes)
+    sample = make_sample(observation, make_candidates(rng, kind=kind), make_config())
+    assert sample.phase == phase
+
+
+def test_prior_and_phrase_are_taken_along(
+    make_observation, make_candidates, make_config, rng: np.random.Generator
+) -> None:
+    candidates, phrase = make_candidates(rng), rng.normal(size=16).astype(np.float32)
+    whole = make_sample(make_observation(rng), candidates, make_config())
+    apart = make_sample(make_observation(rng, phrase_pooled=phrase), candidates, make_config())
+    np.testing.assert_array_equal(whole.phrase, whole.pooled)
+    np.testing.assert_array_equal(apart.phrase, phrase)
+    batch = collate([whole, apart])
+    np.testing.assert_array_equal(batch.prior, [candidates.prior] * 2)
+    np.testing.assert_array_equal(batch.phrase[1], phrase)
+
+
+def test_points_may_be_chosen_beforehand(
+    make_observation, make_candidates, make_config, rng: np.random.Generator
+) -> None:
+    observation, candidates = make_observation(rng, 200), make_candidates(rng)
+    config = make_config(max_points=32)
+    expected = make_sample(observation, candidates, config)
+    chosen = choose_points(observation, config)
+    again = make_sample(observation, candidates, config, chosen=chosen)
+    np.testing.assert_array_equal(again.features, expected.features)
+    few = make_sample(observation, candidates, config, chosen=chosen[:5])
+    np.testing.assert_array_equal(few.positions, expected.positions[:5])
+
+
 def test_move_to_a_device_keeps_everything(
     make_observation, make_candidates, make_config, rng: np.random.Generator
 ) -> None:
@@ -81,8 +130,14 @@ def test_wrong_number_of_channels(
     ("changes", "message"),
     [
         ({"positions": np.zeros((4, 2))}, "positions: got shape (4, 2), expected (N, 3)."),
-        ({"poses": np.zeros((4, 6))}, "poses: got shape (4, 6), expected (K, 7)."),
-        ({"phase": 2}, "phase: got 2, expected 0 (pick) or 1 (place)."),
+        ({"poses": np.zeros((7, 6))}, "poses: got shape (7, 6), expected (K, 7)."),
+        ({"prior": np.zeros(3)}, "prior: got shape (3,), expected (K=7,)."),
+        ({"prior": np.full(7, 1.5)}, "prior: got values from 1.5 to 1.5, expected 0 to 1."),
+        ({"phrase": np.zeros(8)}, "phrase: got shape (8,), expected (C=16,)."),
+        (
+            {"phase": 4},
+            "phase: got 4, expected one of 0 (pick), 1 (place), 2 (place inside), 3 (place outside).",
+        ),
     ],
 )
 def test_bad_sample(
@@ -111,6 +166,7 @@ def test_bad_batches(
         features=sample.features[:, :8],
         tokens=sample.tokens[:, :8],
         pooled=sample.pooled[:8],
+        phrase=sample.phrase[:8],
     )
     with pytest.raises(InvalidArrayError) as caught:
         collate([sample, narrow])

@@ -23,6 +23,10 @@ from policy.network.config import SRConfig, ablation_switches
             "point_selection: got 'all', expected one of balanced, similar.",
         ),
         (
+            {"language_attention": "both"},
+            "language_attention: got 'both', expected one of gate, points.",
+        ),
+        (
             {"one_align": False},
             "dssa: got True with one_align=False, expected dssa=False: DSSA refines what stage 1 "
             "puts out.",
@@ -45,6 +49,9 @@ def test_paper_sizes() -> None:
 def test_ablations(name: Any) -> None:
     config = SRConfig(feature_dim=8, **ablation_switches(name))
     assert (config.one_align, config.dssa) == (name != "base", name == "sr")
+    assert config.mask_readout == (name != "base")
+    # The same inputs for all.
+    assert config.prior and config.phrase and config.side and config.similarity
 
 
 def test_unknown_ablation() -> None:

@@ -1,15 +1,19 @@
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
+from policy.actions import ActionCandidates, ActionScores
 from policy.network.batch import SRBatch, SRSample, collate, make_sample
 from policy.network.config import SRConfig
 from policy.network.loss import SRTarget, SRTargetBatch, collate_targets, sr_loss
 from policy.network.model import SRNetwork
+from policy.observation import Observation
 
+# Switches of what the paper does not have.
+PAPER_ONLY = ("prior", "phrase", "side", "similarity", "candidate_bias", "mask_readout")
 VARIANTS = [
     ("base", {}),
     ("sr_a", {}),
@@ -18,6 +22,9 @@ VARIANTS = [
     ("sr", {"sparsifier": "softmax"}),
     ("sr", {"self_attention": "full"}),
     ("sr", {"query_fourier": False, "num_encoder_layers": 0}),
+    ("sr", {"language_attention": "points"}),
+    ("base", {"mask_readout": True}),
+    ("sr", dict.fromkeys(PAPER_ONLY, False)),
 ]
 
 
@@ -37,7 +44,7 @@ def _samples(
     sizes = [(40, 5, 7, "pick"), (23, 2, 3, "place"), (64, 8, 1, "pick")]
     return [
         make_sample(
-            make_observation(rng, num_points, num_tokens),
+            make_observation(rng, num_points, num_tokens, phrase_pooled=rng.normal(size=16)),
             make_candidates(rng, num_candidates, kind),
             config,
         )
@@ -96,6 +103,7 @@ def test_content_of_padding_changes_nothing(config: SRConfig, samples: list[SRSa
         similarity=batch.similarity - 7.0 * ~batch.point_mask,
         tokens=batch.tokens + 2.0 * ~batch.token_mask[..., None],
         poses=batch.poses + 4.0 * ~batch.candidate_mask[..., None],
+        prior=batch.prior + 6.0 * ~batch.candidate_mask,
     )
     torch.testing.assert_close(network(garbage).logits, network(batch).logits, rtol=0, atol=2e-5)
 
@@ -103,7 +111,7 @@ def test_content_of_padding_changes_nothing(config: SRConfig, samples: list[SRSa
 def test_candidates_permute_with_their_scores(config: SRConfig, samples: list[SRSample]) -> None:
     network, batch = _network(config), collate(samples[:1])
     order = torch.randperm(7, generator=torch.Generator().manual_seed(0))
-    permuted = replace(batch, poses=batch.poses[:, order])
+    permuted = replace(batch, poses=batch.poses[:, order], prior=batch.prior[:, order])
     torch.testing.assert_close(
         network(permuted).logits, network(batch).logits[:, order], rtol=0, atol=2e-5
     )
@@ -135,13 +143,24 @@ def _changed_logits(network: SRNetwork, batch: SRBatch, **changes: torch.Tensor)
 def test_scores_depend_on_every_input(config: SRConfig, samples: list[SRSample]) -> None:
     network, batch = _network(config), collate(samples)
     assert _changed_logits(network, batch, phase=1 - batch.phase) > 1e-4
+    places = torch.full_like(batch.phase, 2)
+    by_side = (
+        network(replace(batch, phase=places + 1)).logits
+        - network(replace(batch, phase=places)).logits
+    )
+    assert bool(by_side[batch.candidate_mask].any()) == config.side
+    assert (_changed_logits(network, batch, prior=1 - batch.prior) > 1e-4) == config.prior
     assert _changed_logits(network, batch, features=-batch.features) > 1e-4
     assert _changed_logits(network, batch, positions=-batch.positions) > 1e-5
-    language = {"pooled": -batch.pooled, "tokens": -batch.tokens}
-    if config.one_align:
-        assert _changed_logits(network, batch, **language) > 1e-5
-    else:
-        assert _changed_logits(network, batch, similarity=-batch.similarity) > 1e-5
+    uses_similarity = config.similarity or config.language_attention == "points"
+    for name, is_used in {
+        "pooled": config.one_align,
+        "tokens": config.one_align,
+        "phrase": config.one_align and config.phrase,
+        "similarity": not config.one_align or uses_similarity,
+    }.items():
+        change = _changed_logits(network, batch, **{name: -getattr(batch, name)})
+        assert change > 1e-5 if is_used else change == 0
 
 
 def test_gradient_reaches_every_parameter(
@@ -159,6 +178,21 @@ def test_gradient_reaches_every_parameter(
     # the convolution has moved.
     betas = [f"dssa_layers.{i}.beta" for i in range(config.num_dssa_layers)]
     assert dead == (betas if config.sparsifier == "softmax" else [])
+
+
+@pytest.mark.parametrize("ablation", ["base", "sr_a", "sr"])
+def test_half_precision_gives_nearly_the_same(
+    rng: np.random.Generator, make_observation, make_candidates, make_config, ablation: str
+) -> None:
+    config = make_config(ablation)
+    samples = _samples(rng, make_observation, make_candidates, config)
+    network, batch, targets = _network(config), collate(samples), _targets(rng, samples)
+    with torch.autocast("cpu", torch.bfloat16):
+        half = network(batch)
+    full = network(batch)
+    torch.testing.assert_close(half.logits.float(), full.logits, rtol=0, atol=0.1)
+    sr_loss(half, targets, config).backward()
+    assert all(p.grad is not None and p.grad.isfinite().all() for p in network.parameters())
 
 
 @pytest.mark.parametrize("ablation", ["base", "sr_a", "sr"])
@@ -195,6 +229,104 @@ def test_outputs_stay_in_their_ranges(config: SRConfig, samples: list[SRSample])
 
 def test_no_rotation_is_refined_before_training(config: SRConfig, samples: list[SRSample]) -> None:
     assert not SRNetwork(config)(collate(samples)).rotvec_tool.any()
+
+
+def _two_objects(
+    rng: np.random.Generator, make_observation: Any, wanted: int, **changes: Any
+) -> tuple[Observation, ActionCandidates]:
+    """Two clusters of unlike features, one of which is asked for, and candidates on both."""
+    centers = np.array([[0.4, -0.1, 0.05], [0.6, 0.1, 0.05]])
+    kinds = rng.normal(size=(2, 16))
+    kinds /= np.linalg.norm(kinds, axis=1, keepdims=True)
+    features = np.repeat(kinds, 30, axis=0) + rng.normal(0, 0.1, (60, 16))
+    features /= np.linalg.norm(features, axis=1, keepdims=True)
+    observation = make_observation(
+        rng,
+        60,
+        points=np.repeat(centers, 30, axis=0) + rng.normal(0, 0.01, (60, 3)),
+        features=features,
+        similarity=features @ kinds[wanted],
+        text_tokens=rng.normal(size=(5, 16)),
+        text_pooled=kinds[wanted],
+        **changes,
+    )
+    poses = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (10, 1, 1))
+    poses[:, :3, 3] = np.repeat(centers, 5, axis=0) + rng.normal(0, 0.01, (10, 3))
+    candidates = ActionCandidates(
+        kind="pick", Ts_world_tool=poses, width_m=np.full(10, 0.04), prior=rng.uniform(size=10)
+    )
+    return observation, candidates
+
+
+@pytest.mark.parametrize("ablation", ["sr_a", "sr"])
+def test_untrained_network_prefers_what_is_asked_for(
+    rng: np.random.Generator, make_observation, make_config, ablation: str
+) -> None:
+    torch.manual_seed(0)
+    network = SRNetwork(make_config(ablation))
+    for decision in range(20):
+        wanted = decision % 2
+        observation, candidates = _two_objects(rng, make_observation, wanted)
+        sample = make_sample(observation, candidates, network.config)
+        logits = network(collate([sample])).logits[0]
+        on_target = slice(5 * wanted, 5 * wanted + 5)
+        others = slice(5 - 5 * wanted, 10 - 5 * wanted)
+        assert logits[on_target].mean() > logits[others].mean() + 0.5
+        assert int(logits.argmax()) // 5 == wanted
+
+
+@pytest.mark.parametrize("ablation", ["base", "sr_a", "sr"])
+def test_moving_everything_with_the_workspace_changes_nothing(
+    rng: np.random.Generator, make_observation, make_config, ablation: str
+) -> None:
+    network = _network(make_config(ablation))
+    shift = np.array([0.3, -0.2, 0.1])
+    observation, candidates = _two_objects(rng, make_observation, 0)
+    poses = candidates.Ts_world_tool.copy()
+    poses[:, :3, 3] += shift
+    moved = replace(candidates, Ts_world_tool=poses)
+
+    def logits(observation: Observation, candidates: ActionCandidates) -> torch.Tensor:
+        return network(collate([make_sample(observation, candidates, network.config)])).logits
+
+    expected = logits(observation, candidates)
+    with_workspace = replace(
+        observation,
+        points=observation.points + shift,
+        workspace_min=observation.workspace_min + shift,
+        workspace_max=observation.workspace_max + shift,
+    )
+    torch.testing.assert_close(logits(with_workspace, moved), expected, rtol=0, atol=1e-3)
+    in_place = replace(observation, points=observation.points + shift)
+    assert (logits(in_place, moved) - expected).abs().max() > 1e-2
+
+
+def test_weights_are_the_softmax_of_inner_products(
+    rng: np.random.Generator, make_observation, make_candidates, make_config
+) -> None:
+    # Eq. (13) and (14), with the evidence that we add: prior and mask are switched off.
+    config = make_config(prior=False, mask_readout=False, num_encoder_layers=0)
+    network = _network(config).double()
+    sample = make_sample(make_observation(rng), make_candidates(rng), config)
+    batch = collate([sample])
+    batch = replace(
+        batch,
+        **{
+            f.name: getattr(batch, f.name).double()
+            for f in fields(batch)
+            if getattr(batch, f.name).is_floating_point()
+        },
+    )
+    states = []
+    network.decoder.register_forward_pre_hook(lambda _, inputs: states.append(inputs[0]))
+    logits = network(batch).logits[0]
+    query, rows = network.decoder.query.tolist(), states[0][0].tolist()
+    expected = [sum(a * b for a, b in zip(query, row, strict=True)) / 32**0.5 for row in rows]
+    weights = np.exp(expected) / np.exp(expected).sum()
+    np.testing.assert_allclose(logits.detach().numpy(), expected, atol=1e-10)
+    scores = ActionScores(logits=logits.detach().numpy())
+    np.testing.assert_allclose(scores.probabilities, weights, atol=1e-6)
+    assert scores.probabilities.sum() == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("ablation", ["base", "sr_a", "sr"])

@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from policy.base import Policy
-from policy.errors import InvalidCheckpointError
+from policy.errors import InvalidArrayError, InvalidCheckpointError
+from policy.explanation import ExplainingPolicy, PolicyExplanation
 from policy.network.checkpoint import save_checkpoint
 from policy.registry import load_policy
 from policy.sr import SRPolicy
@@ -53,6 +54,66 @@ def test_same_seed_same_bytes(
     )
     assert first == second != other
     assert torch.equal(torch.random.get_rng_state(), state)
+
+
+@pytest.mark.parametrize("ablation", ["base", "sr_a", "sr"])
+@pytest.mark.parametrize("num_candidates", [0, 6])
+def test_explanation_belongs_to_the_decision(
+    make_config,
+    make_observation,
+    make_candidates,
+    rng: np.random.Generator,
+    ablation: str,
+    num_candidates: int,
+) -> None:
+    policy = SRPolicy.untrained(make_config(ablation), np.random.default_rng(5))
+    assert isinstance(policy, ExplainingPolicy)
+    observation, candidates = make_observation(rng, 150), make_candidates(rng, num_candidates)
+    explanation = policy.explain(observation, candidates)
+    expected = policy.score(observation, candidates, rng).logits
+    np.testing.assert_array_equal(explanation.logits, expected)
+    assert explanation.points.shape == (64, 3) and explanation.mask.shape == (4, 64)
+    assert {tuple(p) for p in explanation.points} <= {tuple(p) for p in observation.points}
+    np.testing.assert_allclose(explanation.mask.mean(axis=1), np.ones(4), rtol=1e-4)
+    np.testing.assert_allclose(explanation.mean_mask, explanation.mask.mean(axis=0))
+    np.testing.assert_allclose(explanation.alpha, np.full((2 * (ablation == "sr"), 2), 0.5))
+
+
+def test_explanation_of_small_and_empty_clouds(
+    untrained: SRPolicy, make_observation, make_candidates, rng: np.random.Generator
+) -> None:
+    for num_points in (0, 1, 9):
+        explanation = untrained.explain(make_observation(rng, num_points), make_candidates(rng))
+        assert explanation.mask.shape == (4, num_points)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"points": np.zeros((3, 3))}, "mask: got shape (2, 4), expected (H, M=3)."),
+        ({"mask": np.zeros((0, 4))}, "mask: got 0 heads, expected at least 1."),
+        ({"mask": np.full((2, 4), -1.0)}, "mask: got values from -1 to -1, expected at least 0."),
+        ({"alpha": np.full((1, 2), 2.0)}, "alpha: got values from 2 to 2, expected 0 to 1."),
+    ],
+)
+def test_bad_explanations(changes: dict[str, np.ndarray], message: str) -> None:
+    good = {
+        "points": np.zeros((4, 3)),
+        "mask": np.ones((2, 4)),
+        "alpha": np.full((1, 2), 0.5),
+        "logits": np.zeros(3),
+    }
+    with pytest.raises(InvalidArrayError) as caught:
+        PolicyExplanation(**(good | changes))
+    assert str(caught.value) == message
+
+
+def test_checkpoint_of_another_encoder(untrained: SRPolicy, tmp_path: Path) -> None:
+    path = tmp_path / "sr.safetensors"
+    save_checkpoint(path, untrained.network, {}, encoder="embedded-1")
+    assert load_policy("sr", checkpoint=path, encoder="embedded-1").name == "sr"
+    with pytest.raises(InvalidCheckpointError, match="features of the encoder embedded-1"):
+        load_policy("sr", checkpoint=path, encoder="ViT-L-14")
 
 
 def test_checkpoint_round_trip(
