@@ -8,7 +8,7 @@ from models.gripper_geometry import ROBOTIQ_2F85_CLASS, GripperGeometry
 TOOL_SITE = "tool"
 FINGER_JOINTS = ("left_finger_joint", "right_finger_joint")
 FINGER_ACTUATOR = "fingers"
-GRIP_FORCE_N = 40.0
+GRIP_FORCE_N = 80.0
 """Force limit of the closing drive; the data sheet allows 20 to 235 N."""
 
 _PALM_MASS, _FINGER_MASS = 0.78, 0.06

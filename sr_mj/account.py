@@ -23,6 +23,7 @@ _PHRASES = {
         Reason.NOTHING_IN_SIGHT: "nothing to place it by in sight",
         Reason.NO_CANDIDATES: "no place found",
         Reason.UNREACHABLE: "no place can be reached",
+        Reason.APPROACH_COLLISION: "bumped into something before it was down",
         Reason.SLIPPED_CARRY: "lost it on the way",
     },
 }

@@ -21,6 +21,8 @@ from sr_mj.pipeline import EpisodeRngs, Pipeline, look, observe
 from sr_mj.planning import Plan
 from sr_mj.scene import Scene
 
+_DescribeHeld = Callable[[GeometryCloud], HeldObject]
+
 DEFAULT_ATTEMPTS = 8
 PLACE_LOOKS = 3
 """How often is looked for a place to put something, while none that can be reached is found."""
@@ -60,13 +62,13 @@ def run_episode(
         picking = replace(
             pipeline, policy=OraclePolicy(scene), perturbation=None, keep_unreachable=False
         )
-    held = None
+    describe_held = None
     for attempt in _pick(scene, picking, rngs, max_attempts):
         yield replace(attempt, is_hand_over=hand_over)
         if attempt.outcome.success and scene.goal.place is not None:
-            held = _held(attempt, pipeline)
-    if held is not None:
-        yield from _place(scene, pipeline, rngs, held)
+            describe_held = _held_after(attempt, pipeline)
+    if describe_held is not None:
+        yield from _place(scene, pipeline, rngs, describe_held)
 
 
 def _pick(
@@ -75,7 +77,7 @@ def _pick(
     """Try to grasp until a target is held."""
     text, failed = pick_text(scene.goal.text), FailedGrasps()
 
-    def propose(cloud: GeometryCloud) -> ActionCandidates:
+    def propose(cloud: GeometryCloud, _: HeldObject | None) -> ActionCandidates:
         return failed.without(pipeline.generator.pick(cloud, rngs.candidates))
 
     for index in range(max_attempts):
@@ -87,16 +89,17 @@ def _pick(
 
 
 def _place(
-    scene: Scene, pipeline: Pipeline, rngs: EpisodeRngs, held: HeldObject
+    scene: Scene, pipeline: Pipeline, rngs: EpisodeRngs, describe_held: _DescribeHeld
 ) -> Iterator[Attempt]:
     """Put down what is held, once; look again while no place for it is found."""
 
-    def propose(cloud: GeometryCloud) -> ActionCandidates:
+    def propose(cloud: GeometryCloud, held: HeldObject | None) -> ActionCandidates:
+        assert held is not None
         return pipeline.placer.place(cloud, held, rngs.candidates)
 
     for index in range(PLACE_LOOKS):
         text = place_text(scene.goal.text)
-        attempt = _attempt(scene, pipeline, rngs, index, text, propose, held)
+        attempt = _attempt(scene, pipeline, rngs, index, text, propose, describe_held)
         yield attempt
         if not attempt.outcome.reason.is_idle:
             return
@@ -108,12 +111,12 @@ def _attempt(
     rngs: EpisodeRngs,
     index: int,
     text: PhaseText,
-    propose: Callable[[GeometryCloud], ActionCandidates],
-    held: HeldObject | None = None,
+    propose: Callable[[GeometryCloud, HeldObject | None], ActionCandidates],
+    describe_held: _DescribeHeld | None = None,
 ) -> Attempt:
     """Look, perceive, propose, decide, plan, act."""
     watch = Stopwatch()
-    percept = candidates = scores = plan = None
+    percept = candidates = scores = plan = held = None
     num_unreachable = 0
     with watch.measure("look"):
         views = look(scene, pipeline, rngs.noise)
@@ -124,7 +127,8 @@ def _attempt(
         outcome = Outcome(success=False, reason=Reason.NOTHING_IN_SIGHT)
     else:
         with watch.measure("propose"):
-            proposed = propose(percept.geometry)
+            held = None if describe_held is None else describe_held(percept.geometry)
+            proposed = propose(percept.geometry, held)
         with watch.measure("reach"):
             candidates = _reachable(pipeline, proposed)
             num_unreachable = len(proposed) - len(candidates)
@@ -182,8 +186,10 @@ def _act(
     return pipeline.executor.execute(plan, keep_target=scene.goal.place is not None)
 
 
-def _held(attempt: Attempt, pipeline: Pipeline) -> HeldObject:
-    """Describe what is in the gripper by the cloud before the grasp and the robot's joints."""
+def _held_after(attempt: Attempt, pipeline: Pipeline) -> _DescribeHeld:
+    """Describe what is in the gripper by the clouds before and after, and the robot's joints."""
     executor = pipeline.executor
     assert attempt.percept is not None and executor.T_world_grasp is not None
-    return held_object(attempt.percept.geometry, executor.T_world_grasp, executor.drive.width_m)
+    before, T_world_grasp = attempt.percept.geometry, executor.T_world_grasp
+    width_m = executor.drive.width_m
+    return lambda after: held_object(before, T_world_grasp, width_m, after=after)

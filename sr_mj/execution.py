@@ -24,7 +24,9 @@ class ExecutionConfig:
         drive: Speeds and tolerances of the robot.
         blocked_tol_rad: Joint error at the end of a motion towards objects from which on something
             is in the way: 0.01 rad is about 5 mm at the tool.
-        guard_rad: Joint error at which lowering stops, since what is held has touched down.
+        guard_rad: Joint error at which lowering stops, since what is held has touched down; in
+            the air the joints lag by 0.003 rad at most.
+        early_touch_m: Height over the place above which touching is a collision.
         release_s: Wait after opening over the bin.
         release_speed: Speed of the opening where something is put down, m/s.
         part_s: Wait after that, before the fingers leave.
@@ -36,7 +38,8 @@ class ExecutionConfig:
 
     drive: DriveConfig = field(default_factory=DriveConfig)
     blocked_tol_rad: float = 0.02
-    guard_rad: float = 0.02
+    guard_rad: float = 0.01
+    early_touch_m: float = 0.015
     release_s: float = 0.4
     release_speed: float = 0.04
     part_s: float = 0.2
@@ -98,7 +101,7 @@ class Executor:
         if plan.kind == "pick":
             outcome = self._pick(plan, segments, judge, keep_target)
         else:
-            outcome = self._place(segments, judge)
+            outcome = self._place(plan, segments, judge)
         check_stable(self._scene.data)
         elapsed = self._scene.data.time - start_time
         return replace(
@@ -155,14 +158,17 @@ class Executor:
         is_target = held in self._scene.goal.targets
         return (Reason.GRASPED_TARGET if is_target else Reason.GRASPED_OTHER), held
 
-    def _place(self, segments: dict[Phase, Segment], judge: Judge) -> Outcome:
+    def _place(self, plan: Plan, segments: dict[Phase, Segment], judge: Judge) -> Outcome:
         moved = object_in_gripper(self._scene)
         judge.begin_place(moved)
-        self._move(segments[Phase.TRANSIT])
+        is_blocked = self._move(segments[Phase.TRANSIT]) > self.config.blocked_tol_rad
+        is_lost = self._has_lost(moved)
         followed = self._lower(segments[Phase.LOWER])
-        is_lost = not self.drive.feels_object
+        early_m = self.drive.T_world_tool[2, 3] - plan.T_world_tool[2, 3]
+        is_blocked |= bool(early_m > self.config.early_touch_m)
+        if not is_blocked:
+            is_lost |= self._has_lost(moved)
         if moved is not None:
-            is_lost |= object_in_gripper(self._scene) != moved
             judge.begin_release(moved)
         with self._waking():
             self.drive.let_go(segments[Phase.RELEASE].width_m, self.config.release_speed)
@@ -170,14 +176,21 @@ class Executor:
         self._retreat(segments, followed)
         self._move(segments[Phase.RETURN])
         self._settle(judge)
-        return self._judge_place(judge, moved, is_lost)
+        failure = Reason.APPROACH_COLLISION if is_blocked else None
+        return self._judge_place(judge, moved, Reason.SLIPPED_CARRY if is_lost else failure)
 
-    def _judge_place(self, judge: Judge, moved: str | None, is_lost: bool) -> Outcome:
+    def _has_lost(self, moved: str | None) -> bool:
+        """Tell whether the gripper is empty, or what it held is not in it any more."""
+        is_there = moved is None or moved in touching_fingers(self._scene)
+        return not (self.drive.feels_object and is_there)
+
+    def _judge_place(self, judge: Judge, moved: str | None, failure: Reason | None) -> Outcome:
+        """Judge the settled state; what failed on the way explains an object that is not placed."""
         if moved is None:
             return Outcome(success=False, reason=Reason.SLIPPED_CARRY)
         reason, missed = judge.place_reason(moved), judge.missed_m(moved)
-        if is_lost and reason is not Reason.PLACED:
-            reason = Reason.SLIPPED_CARRY
+        if failure is not None and reason is not Reason.PLACED:
+            reason = failure
         diagonal = self._scene.workspace.diagonal_m
         success = reason is Reason.PLACED
         return Outcome(

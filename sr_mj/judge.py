@@ -38,12 +38,22 @@ def touching_fingers(scene: Scene) -> dict[str, set[int]]:
 
 
 def object_in_gripper(scene: Scene) -> str | None:
-    """Return the name of the object that both fingers touch, or None."""
-    tool = scene.data.site(TOOL_SITE_NAME).xpos
+    """Name what the closed gripper holds clear of the table; None if it is empty.
+
+    That is the object that both fingers touch, or, of two objects that are pressed against each
+    other between them, the one that is asked for.
+    """
+    tool, touched = scene.data.site(TOOL_SITE_NAME).xpos, touching_fingers(scene)
+    num_fingers = len(set[int]().union(*touched.values()))
+    if num_fingers < 2:
+        return None
     return min(
-        (name for name, fingers in touching_fingers(scene).items() if len(fingers) == 2),
-        key=lambda name: float(np.linalg.norm(_center(scene, name) - tool)),
-        default=None,
+        touched,
+        key=lambda name: (
+            len(touched[name]) < 2,
+            name not in scene.goal.targets,
+            float(np.linalg.norm(_center(scene, name) - tool)),
+        ),
     )
 
 

@@ -7,12 +7,19 @@ from models.gripper_geometry import ROBOTIQ_2F85_CLASS
 from policy.actions import ActionCandidates, ActionScores
 from policy.observation import Observation
 from sr_mj.judge import object_in_gripper
+from sr_mj.oracle_drop import rule_out_falls
 from sr_mj.oracle_place import score_places
 from sr_mj.scene import Scene, SceneObject
+from sr_mj.scene.placement import find_object
 
 _ON_TARGET = 10.0
 _SIDE_MARGIN_M = 0.004
 _MIN_POINTS = 3
+# Two things gripped at once are both carried off, and what is put down is not alone.
+_SHARED = -1.0
+# An object that is held beside its centre of mass turns between the fingers on the way; at this
+# distance that costs as much as half of the prior.
+_LEVER_SCALE_M, _LEVER = 0.06, -0.5
 
 
 def _surface_points(item: SceneObject) -> np.ndarray:
@@ -25,9 +32,12 @@ class OraclePolicy:
     """Chooses by ground truth: a grasp that closes on a target, a place well inside the region.
 
     Picking, a candidate that would close on an object of the target set beats every other; among
-    those, the geometric prior decides. If there is none, the candidate nearest to a target wins:
-    it most likely removes what lies on it or beside it. Placing, see `score_places`. Privileged: it
-    reads object poses and the goal's objects, which no real robot can.
+    those, the geometric prior decides, less for what would be gripped along with it and, where it
+    is to be placed, for its weight beside the fingers. If there is none, the candidate nearest to
+    a target wins: it most likely removes what lies on it or beside it. Placing, the place deepest
+    inside the region wins at which the object, let fall in a copy of the scene, stays; see
+    `score_places`. Privileged: it reads object poses and the goal's objects, which no real robot
+    can.
 
     Args:
         scene: The scene that is acted in; read at every decision.
@@ -51,24 +61,40 @@ class OraclePolicy:
             rng: Ignored.
 
         Returns:
-            Logits. Of grasps: 10 + prior on a target, otherwise prior - distance to the nearest
-            target in decimetres. Of places: see `score_places`.
+            Logits. Of grasps: 10 + prior on a target, less 1 where another object is between the
+            fingers too, and less up to 0.5 for a lever if it is to be placed; otherwise
+            prior - distance to the nearest target in decimetres. Of places: see `score_places`.
         """
         if candidates.kind == "place":
             moved = object_in_gripper(self._scene)
             if moved is None:
                 return ActionScores(logits=candidates.prior)
-            return ActionScores(logits=score_places(self._scene, moved, candidates))
+            scores = score_places(self._scene, moved, candidates)
+            if self._scene.goal.place is not None and self._scene.goal.place.references:
+                scores = rule_out_falls(self._scene, moved, candidates, scores, _ON_TARGET)
+            return ActionScores(logits=scores)
         targets = self._scene.goal.targets
         if not len(candidates) or not targets:
             return ActionScores(logits=candidates.prior)
         names = list(self._surfaces)
         grips = np.stack([self._points_between_fingers(n, candidates) for n in names])
-        on_target = np.isin(np.array(names)[grips.argmax(axis=0)], targets)
-        on_target &= grips.max(axis=0) >= _MIN_POINTS
+        gripped = np.array(names)[grips.argmax(axis=0)]
+        on_target = np.isin(gripped, targets) & (grips.max(axis=0) >= _MIN_POINTS)
+        gain = _ON_TARGET + _SHARED * ((grips >= _MIN_POINTS).sum(axis=0) > 1)
+        if self._scene.goal.place is not None:
+            gain = gain + _LEVER * self._levers(gripped, candidates)
         distance = np.min([self._distance(name, candidates.positions) for name in targets], axis=0)
-        bonus = np.where(on_target, _ON_TARGET, -10 * distance)
+        bonus = np.where(on_target, gain, -10 * distance)
         return ActionScores(logits=(candidates.prior + bonus).astype(np.float32))
+
+    def _levers(self, names: np.ndarray, candidates: ActionCandidates) -> np.ndarray:
+        """Rate (K,) in 0..1 the lever by which gravity turns each gripped object in the pads."""
+        bodies = [find_object(self._scene, str(name)).body.body_id for name in names]
+        offset = self._scene.data.xipos[bodies] - candidates.positions
+        closing = candidates.Ts_world_tool[:, :3, 0]
+        # The torque of the weight about the axis through both pads, over the weight.
+        lever = np.abs(closing[:, 0] * offset[:, 1] - closing[:, 1] * offset[:, 0])
+        return (lever / _LEVER_SCALE_M).clip(0, 1)
 
     def _world_points(self, name: str) -> np.ndarray:
         pose = self._scene.T_world_object(name)

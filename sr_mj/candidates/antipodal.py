@@ -4,7 +4,7 @@ Seeds spread over the surface -> orientations from the surface around them -> st
 gaps beside the object -> contact patches -> swept collision checks -> a spread-out choice.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,8 +13,14 @@ from policy.actions import ActionCandidates
 from sr_mj.candidates.collision import hits_points, swept_boxes, table_clearance
 from sr_mj.candidates.config import AntipodalConfig, Relaxation
 from sr_mj.candidates.contacts import Contacts, find_contacts
-from sr_mj.candidates.frames import choose_orientations
-from sr_mj.candidates.ranking import best_per_group, grasp_prior, select_spread
+from sr_mj.candidates.flat import flat_without_candidate
+from sr_mj.candidates.frames import Hypotheses, choose_orientations
+from sr_mj.candidates.ranking import (
+    best_per_group,
+    chance_of_two,
+    grasp_prior,
+    select_spread,
+)
 from sr_mj.candidates.strips import FingerPlacements, depth_hypotheses, place_fingers, scan_strips
 from sr_mj.candidates.surface import ObjectSurface, choose_seeds, extract_surface, thin
 from sr_mj.candidates.threads import single_threaded
@@ -24,6 +30,8 @@ _COARSE_M = 0.009
 _ROUNDING_M = 1e-4
 # Depth of engagement at which a placement is as good as it gets; only orders placements.
 _FULL_ENGAGEMENT_M = 0.03
+# Approaches within 8 degrees of the vertical.
+_DOWN = -0.99
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +40,9 @@ class _Search:
 
     surface: ObjectSurface
     origins: np.ndarray
-    placements: FingerPlacements
+    pairs: Hypotheses
+    profiles: np.ndarray
+    shift_m: np.ndarray
 
 
 class AntipodalSampler:
@@ -64,7 +74,7 @@ class AntipodalSampler:
         Returns:
             At most `max_candidates` grasps, best prior first; none is a normal result.
         """
-        surface = extract_surface(cloud.points, cloud.normals, self.config)
+        surface = extract_surface(cloud.points, cloud.normals, self.config, cloud.colors)
         seeds = choose_seeds(surface.points, self.config, rng)
         candidates = _no_candidates()
         if len(seeds):
@@ -74,6 +84,7 @@ class AntipodalSampler:
                     candidates = self._finish(search, limits)
                     if len(candidates):
                         break
+                candidates = self._add_flat(search, candidates)
         return candidates
 
     def approach_opening(self, width_m: np.ndarray) -> np.ndarray:
@@ -88,35 +99,67 @@ class AntipodalSampler:
         return np.minimum(width_m + self.config.extra_opening_m, self.config.gripper.max_width_m)
 
     def _search(self, surface: ObjectSurface, seeds: np.ndarray) -> _Search:
-        """Find all places around the seeds where an object fits between the fingers."""
-        config = self.config
+        """Scan the strips around the seeds under all orientations that make sense."""
         origins = surface.points[seeds]
-        pairs = choose_orientations(surface.points, surface.normals, seeds, config)
-        coarse = thin(surface.obstacles, config.scan_voxel_m)
+        pairs = choose_orientations(surface.points, surface.normals, seeds, self.config)
+        coarse = thin(surface.obstacles, self.config.scan_voxel_m)
         profiles, shift_m = scan_strips(coarse, origins, pairs)
-        seed, rotation = pairs.seed, pairs.rotations[pairs.orientation]
-        row, depth_m = depth_hypotheses(origins[seed, 2], rotation, config)
         return _Search(
-            surface=surface,
-            origins=origins,
-            placements=place_fingers(
-                seed[row], rotation[row], depth_m, profiles[row], shift_m[row], config
-            ),
+            surface=surface, origins=origins, pairs=pairs, profiles=profiles, shift_m=shift_m
         )
 
-    def _finish(self, search: _Search, limits: Relaxation) -> ActionCandidates:
-        """Reduce placements to candidates under the thresholds of one pass."""
+    def _add_flat(self, search: _Search, candidates: ActionCandidates) -> ActionCandidates:
+        """Add grasps of flat things that got none."""
         config = self.config
-        placements = self._promising(search.placements, limits)
+        if config.flat is None:
+            return candidates
+        is_flat = flat_without_candidate(
+            search.surface.points, search.origins, candidates.positions, config.flat_height_m
+        )
+        if not is_flat.any():
+            return candidates
+        both = _joined(candidates, self._finish(search, config.flat, is_flat))
+        return both.take(select_spread(both.Ts_world_tool, both.prior, config))
+
+    def _place(
+        self, search: _Search, limits: Relaxation, is_wanted: np.ndarray | None
+    ) -> FingerPlacements:
+        """Find all places around the wanted seeds where an object fits between the fingers."""
+        config = replace(self.config, min_tip_height_m=limits.min_tip_height_m)
+        pairs = search.pairs
+        wanted = np.arange(len(pairs.seed))
+        if is_wanted is not None:
+            # What is flat is held from above: a tilted finger does not get down beside it.
+            is_down = pairs.rotations[:, 2, 2] < _DOWN
+            wanted = np.flatnonzero(is_wanted[pairs.seed] & is_down[pairs.orientation])
+        seed, rotation = pairs.seed[wanted], pairs.rotations[pairs.orientation[wanted]]
+        row, depth_m = depth_hypotheses(search.origins[seed, 2], rotation, config)
+        return place_fingers(
+            seed[row],
+            rotation[row],
+            depth_m,
+            search.profiles[wanted[row]],
+            search.shift_m[wanted[row]],
+            config,
+        )
+
+    def _finish(
+        self, search: _Search, limits: Relaxation, is_wanted: np.ndarray | None = None
+    ) -> ActionCandidates:
+        """Find candidates under the thresholds of one pass, at all seeds or at those wanted."""
+        config = self.config
+        placements = self._promising(self._place(search, limits, is_wanted), limits)
         contacts = find_contacts(placements, search.origins, search.surface, config)
         poses = self._tool_poses(search.origins, placements, contacts)
-        prior = grasp_prior(contacts, placements.engagement_m, poses[:, 2, 2])
+        stroke = config.gripper.max_width_m
+        prior = grasp_prior(contacts, placements.engagement_m, poses[:, 2, 2], stroke)
         low, high = swept_boxes(self.approach_opening(contacts.width_m), config)
-        is_good = prior >= config.min_prior
+        is_good = prior >= limits.min_prior
         is_good &= contacts.alignment.min(axis=1) > limits.min_alignment
         is_good &= contacts.opposition < limits.max_opposition
-        is_good &= contacts.width_m < config.gripper.max_width_m
-        is_good &= table_clearance(poses, low, high) > config.min_tip_height_m - _ROUNDING_M
+        is_good &= contacts.width_m < stroke
+        is_good &= chance_of_two(contacts) <= config.max_chance_of_two
+        is_good &= table_clearance(poses, low, high) > limits.min_tip_height_m - _ROUNDING_M
 
         low, high = low - limits.clearance_m, high + limits.clearance_m
         rows = np.flatnonzero(is_good)
@@ -159,4 +202,13 @@ class AntipodalSampler:
 def _no_candidates() -> ActionCandidates:
     return ActionCandidates(
         kind="pick", Ts_world_tool=np.zeros((0, 4, 4)), width_m=np.zeros(0), prior=np.zeros(0)
+    )
+
+
+def _joined(first: ActionCandidates, second: ActionCandidates) -> ActionCandidates:
+    return ActionCandidates(
+        kind="pick",
+        Ts_world_tool=np.concatenate([first.Ts_world_tool, second.Ts_world_tool]),
+        width_m=np.concatenate([first.width_m, second.width_m]),
+        prior=np.concatenate([first.prior, second.prior]),
     )

@@ -8,7 +8,8 @@ from scipy.spatial import KDTree
 from perception.cloud import GeometryCloud
 from sr_mj.candidates.config import AntipodalConfig
 from sr_mj.candidates.place_parts import Parts, find_parts
-from sr_mj.candidates.surface import thin, unseen_walls
+from sr_mj.candidates.removed import removed_points, revealed_heights
+from sr_mj.candidates.surface import extract_surface, thin, unseen_walls
 from sr_mj.errors import ConfigError
 
 # How far beyond the pads' space a point may lie: the noise of a thinned cloud.
@@ -18,6 +19,9 @@ _SHARE_BETWEEN, _SHARE_OF_PART, _LEAST_ODDS = 0.15, 0.5, 0.5
 # lowest 5 mm, and the sides below a bulge are not seen.
 _LOW_SHARE, _NEAR_TABLE_M, _AROUND_M = 0.02, 0.03, 0.012
 _STEP_M, _MIN_SIDES = 0.008, 7
+# An object stands on the lowest of what is found below it but for this share, which may be noise or
+# seen past its edge: what is found higher it leaned on, or that has slid into its place.
+_SUPPORT_SHARE = 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,16 +62,26 @@ class HeldObject:
             object.__setattr__(self, name, array)
 
 
-def held_object(cloud: GeometryCloud, T_world_tool: np.ndarray, width_m: float) -> HeldObject:
+def held_object(
+    cloud: GeometryCloud,
+    T_world_tool: np.ndarray,
+    width_m: float,
+    *,
+    after: GeometryCloud | None = None,
+) -> HeldObject:
     """Cut out of a cloud what a grasp closed on.
 
-    What lies between the fingers says which parts of the cloud are meant; what is likely of one
-    thing with them belongs to it as well. Nothing here is ground truth.
+    With a second look, what is gone is held, and what lies below it now is what it stood on.
+    Without one, or where most between the fingers still seems to be there, what lies between them
+    says which parts of the cloud are meant; what is likely of one thing with them belongs to it as
+    well. Nothing here is ground truth.
 
     Args:
         cloud: What was seen before the grasp, in world coordinates, the table at z = 0.
         T_world_tool: (4, 4) pose of the tool at the grasp.
         width_m: Opening at which the fingers came to rest.
+        after: What was seen after the grasp, the held object and the robot left out; None if
+            nobody looked.
 
     Returns:
         The object. If nothing was seen between the fingers, the space between them stands for it.
@@ -77,7 +91,10 @@ def held_object(cloud: GeometryCloud, T_world_tool: np.ndarray, width_m: float) 
     parts = find_parts(cloud, config)
     points = parts.surface.points
     gripped = _is_between_fingers(points, pose, width_m, config)
-    if gripped.any():
+    removed = None if after is None else _removed(parts, after, gripped, config)
+    if removed is not None:
+        seen, bottom_m = removed
+    elif gripped.any():
         mine = _belongs(parts, gripped)
         bottom_m = support_height(points, mine)
         seen = points[mine]
@@ -92,6 +109,25 @@ def held_object(cloud: GeometryCloud, T_world_tool: np.ndarray, width_m: float) 
         T_world_tool=pose,
         width_m=float(width_m),
     )
+
+
+def _removed(
+    parts: Parts, after: GeometryCloud, gripped: np.ndarray, config: AntipodalConfig
+) -> tuple[np.ndarray, float] | None:
+    """Return the points (P, 3) that a grasp took away, and the height of what they stood on."""
+    if not gripped.any():
+        return None
+    left = extract_surface(after.points, after.normals, config).points
+    mine = removed_points(parts, left, gripped, _belongs(parts, gripped))
+    if mine is None:
+        return None
+    seen = parts.surface.points[mine]
+    heights = revealed_heights(seen, after.points)
+    lowest = float(np.quantile(seen[:, 2], _LOW_SHARE))
+    if lowest < _NEAR_TABLE_M or not len(heights):
+        return seen, 0.0
+    support = float(np.quantile(heights, _SUPPORT_SHARE))
+    return seen, min(support, lowest) if support > config.object_min_height_m else 0.0
 
 
 def _is_between_fingers(

@@ -14,21 +14,44 @@ _FULL_AREA = 0.4
 # Deeper engagement than most of a pad's height gains nothing.
 _FULL_ENGAGEMENT_M = 0.03
 _OFFSET_SCALE_M = 0.04
+# Room beside the object, on each side, from which on an approach is not touch and go: the noise of
+# the cloud and of the arm. Without any, the prior is half.
+_FULL_ROOM_M = 0.004
+# Log-odds that the fingers close on two objects: a logistic fit to 5800 grasps in 40 simulated
+# heaps, of which 350 did (area under the ROC curve 0.88). A valley between the contacts tells, and
+# so does a difference in colour; the deepest valleys are often the inside of a cup.
+_PAIR_ODDS, _PAIR_GAP, _PAIR_GAP_CUBED, _PAIR_CONTRAST = -4.39, 5.57, -3.87, 7.34
+_LARGEST_CONTRAST = 0.4
+
+
+def chance_of_two(contacts: Contacts) -> np.ndarray:
+    """Estimate the probability that two objects are between the fingers, not one.
+
+    Args:
+        contacts: Contact patches of K grasps.
+
+    Returns:
+        (K,) probabilities.
+    """
+    logit = _PAIR_ODDS + _PAIR_GAP * contacts.gap + _PAIR_GAP_CUBED * contacts.gap**3
+    logit += _PAIR_CONTRAST * np.minimum(contacts.contrast, _LARGEST_CONTRAST)
+    return 1 / (1 + np.exp(-logit))
 
 
 def grasp_prior(
-    contacts: Contacts, engagement_m: np.ndarray, approach_up: np.ndarray
+    contacts: Contacts, engagement_m: np.ndarray, approach_up: np.ndarray, max_width_m: float
 ) -> np.ndarray:
     """Rate grasps by geometry alone.
 
-    The probability that the contacts are antipodal, given how they look, times gentle factors
-    for what makes an antipodal grasp hold: fingertips deep beside the object, close to its local
-    centre, coming from above.
+    The probability that the contacts are antipodal and belong to one object, given how they look,
+    times gentle factors for what makes such a grasp hold: fingertips deep beside the object, close
+    to its local centre, coming from above, with room between object and open fingers.
 
     Args:
         contacts: Contact patches of K grasps.
         engagement_m: (K,) how far the fingertips reach below the object's highest point.
         approach_up: (K,) vertical components of the approach directions; -1 is straight down.
+        max_width_m: Stroke of the gripper.
 
     Returns:
         (K,) float32 in 0..1.
@@ -40,6 +63,9 @@ def grasp_prior(
     prior *= (engagement_m / _FULL_ENGAGEMENT_M).clip(0, 1) ** 0.25
     prior *= 0.5 + 0.5 * np.exp(-((contacts.offset_m / _OFFSET_SCALE_M) ** 2) / 2)
     prior *= 0.7 + 0.3 * (-approach_up).clip(0, 1)
+    room_m = (max_width_m - contacts.width_m) / 2
+    prior *= 0.5 + 0.5 * (room_m / _FULL_ROOM_M).clip(0, 1)
+    prior *= 1 - chance_of_two(contacts)
     return prior.astype(np.float32)
 
 

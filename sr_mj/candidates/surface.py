@@ -17,16 +17,21 @@ class ObjectSurface:
     Attributes:
         points: (N, 3) float32 world positions, metres, one a voxel.
         normals: (N, 3) float32 unit normals, towards the cameras.
+        colors: (N, 3) float32 RGB, 0..1; black if none were given.
         obstacles: (N + W, 3) float32 `points`, then points that close unseen vertical faces.
     """
 
     points: np.ndarray
     normals: np.ndarray
+    colors: np.ndarray
     obstacles: np.ndarray
 
 
 def extract_surface(
-    points: np.ndarray, normals: np.ndarray, config: AntipodalConfig
+    points: np.ndarray,
+    normals: np.ndarray,
+    config: AntipodalConfig,
+    colors: np.ndarray | None = None,
 ) -> ObjectSurface:
     """Thin a fused cloud, drop the table and close unseen walls.
 
@@ -34,20 +39,23 @@ def extract_surface(
         points: (N, 3) world positions, metres; the table is at z = 0.
         normals: (N, 3) unit normals.
         config: The sampler's settings.
+        colors: (N, 3) RGB, 0..1, if somebody asks for them.
 
     Returns:
         The surface; it may be empty.
     """
     above = points[:, 2] > config.object_min_height_m
-    rows = np.concatenate([points[above], normals[above]], axis=1)
+    colors = np.zeros_like(points) if colors is None else colors
+    rows = np.concatenate([points[above], normals[above], colors[above]], axis=1)
     rows = voxel_means(rows, voxel_keys(rows[:, :3], config.voxel_m))
     rows = rows[_is_supported(rows[:, :2])]
-    thinned, mean_normals = rows[:, :3], rows[:, 3:]
+    thinned, mean_normals = rows[:, :3], rows[:, 3:6]
     lengths = np.linalg.norm(mean_normals, axis=1, keepdims=True)
     walls = unseen_walls(thinned, config.wall_step_m)
     return ObjectSurface(
         points=thinned,
         normals=mean_normals / np.maximum(lengths, 1e-6),
+        colors=rows[:, 6:],
         obstacles=np.concatenate([thinned, walls]),
     )
 

@@ -17,6 +17,8 @@ from sr_mj.kinematics import TOOL_SITE, build_planning_model
 # Between two spheres of a row a capsule stands out by at most this much.
 _CAPSULE_GAP_M = 0.002
 _CELLS_M = (0.012, 0.012, 0.026)
+# What is held is always near these; the wrist's last capsules.
+_NUM_NEAR_LINKS = 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,6 +60,8 @@ class RobotBody:
 
     Attributes:
         radius_m: (S,) radii of the links' spheres, from the shoulder to the wrist.
+        is_far: (S,) which of them belong to links that the gripper does not turn with: all but the
+            last two of the wrist.
     """
 
     def __init__(self, max_overlap_m: float = 0.001) -> None:
@@ -71,6 +75,7 @@ class RobotBody:
         self._geom = np.repeat(capsules, [len(row) for row in rows])
         self._along = np.concatenate(rows)
         self.radius_m = self._model.geom_size[self._geom, 0]
+        self.is_far = ~np.isin(self._geom, capsules[-_NUM_NEAR_LINKS:])
 
     def place(self, qpos: np.ndarray) -> PlacedBody:
         """Place the body.

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from models.tabletop import BIN_CENTER, BIN_HALF_M, BIN_HEIGHT_M
 from sr_mj.candidates.collision import hits_points
@@ -43,7 +44,7 @@ class Clearance:
             qpos: (M, 6) joint angles, rad.
 
         Returns:
-            (M,) metres, for the held object also to table and bin; minus infinity where links,
+            (M,) metres, for the held object also to table, bin and arm; minus infinity where links,
             gripper, table and bin collide, and infinity where there is no cloud.
         """
         qpos = np.asarray(qpos, float).reshape(-1, 6)
@@ -65,12 +66,20 @@ class Clearance:
         if len(self.held_points):
             held = placed.from_tool(self.held_points)
             parts.append((held, np.full(len(self.held_points), _HELD_VOXEL_M / 2)))
-            clear = _over_table_and_bin(held)
+            clear = np.minimum(_over_table_and_bin(held), self._from_arm(placed, held))
         if self.obstacles is None:
             return clear
         centers = np.concatenate([centers for centers, _ in parts], axis=1)
         radii = np.concatenate([radii for _, radii in parts])
         return np.minimum(clear, (self.obstacles.distances(centers) - radii).min(axis=1))
+
+    def _from_arm(self, placed: PlacedBody, held: np.ndarray) -> np.ndarray:
+        """Least distances (M,) of a held object's spheres (M, P, 3) from the arm's links."""
+        links, radii = placed.centers[:, self.body.is_far], self.body.radius_m[self.body.is_far]
+        gaps = np.empty(len(held))
+        for row, (points, centers) in enumerate(zip(held, links, strict=True)):
+            gaps[row] = (cdist(points, centers) - radii).min()
+        return gaps - _HELD_VOXEL_M / 2
 
 
 def gripper_hits(

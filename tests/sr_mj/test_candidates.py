@@ -134,10 +134,10 @@ def test_box_is_closed_on_across_its_faces(yaw_deg):
     assert (np.abs(closing[:, 2]) < np.sin(np.radians(15))).all()
     angle = _angle_to_axes_deg(closing, [yaw_deg, yaw_deg + 90])
     assert np.median(angle) < 7
-    assert np.mean(angle < 20) >= 0.8
+    assert np.mean(angle < 20) > 0.75
     sides = np.abs(picks.width_m[best, None] - [0.04, 0.07]).min(axis=1)
     assert np.median(sides) < 0.003
-    assert np.mean(sides < 0.008) > 0.8
+    assert np.mean(sides < 0.008) > 0.75
 
 
 @pytest.mark.parametrize(

@@ -228,6 +228,20 @@ def test_what_touches_down_early_is_let_go_there(planner, cube_scene):
     np.testing.assert_allclose(scene.data.qpos[:6], HOME_QPOS, atol=5e-3)
 
 
+def test_what_is_in_the_way_down_is_a_collision(planner, cube_scene):
+    scene = with_goal(cube_scene, "near")
+    executor = Executor(scene)
+    half = scene.data.xipos[find_object(scene, "block_cube").body.body_id][2]
+    assert grasp_cube(planner, scene, executor).success
+    can = scene.data.xipos[find_object(scene, "tuna_can").body.body_id].copy()
+    # As if nobody had seen the can: down to the table beside its edge, half of the cube over it.
+    plan = place_plan_at(planner, scene, executor, (can[0] + 0.03, can[1]), half)
+    outcome = executor.execute(plan)
+    assert outcome.reason is Reason.APPROACH_COLLISION and not outcome.success
+    assert outcome.grasped == "block_cube" and outcome.missed_m > 0
+    np.testing.assert_allclose(scene.data.qpos[:6], HOME_QPOS, atol=5e-3)
+
+
 def test_beside_is_not_on(planner, cube_scene):
     scene = with_goal(cube_scene, "on")
     executor = Executor(scene)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sr_mj.judge import Judge, object_in_gripper
+from sr_mj.judge import Judge, object_in_gripper, touching_fingers
 from sr_mj.outcome import Reason
 from sr_mj.scene import Goal, PlaceGoal, SceneConfig, make_scene
 from sr_mj.scene.placement import find_object
@@ -123,3 +123,18 @@ def test_reward_falls_with_the_distance_to_the_target(scene):
 
 def test_nothing_is_in_the_open_gripper(scene):
     assert object_in_gripper(scene) is None
+
+
+def test_of_two_objects_between_the_fingers_the_one_asked_for_is_held(scene):
+    tool = scene.data.site("ur5/gripper/tool")
+    closing = tool.xmat.reshape(3, 3)[:, 0].copy()
+    # Each overlaps the outer side of one finger; the plum is nearer.
+    for name, shift in (("apple", -0.045), ("plum", 0.034)):
+        put(scene, name, tool.xpos + shift * closing, seconds=0)
+        mujoco.mj_forward(scene.model, scene.data)
+        fingers = touching_fingers(scene)
+        assert len(fingers[name]) == 1
+        assert (object_in_gripper(scene) is None) == (len(fingers) == 1)
+    for targets, name in ((("plum",), "plum"), (("apple",), "apple"), ((), "plum")):
+        goal = Goal(text="what is asked for", targets=targets)
+        assert object_in_gripper(replace(scene, goal=goal)) == name

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from models.robot import TOOL_SITE_NAME
 from policy.actions import ActionCandidates
+from sr_mj.oracle_drop import rule_out_falls, stays
 from sr_mj.oracle_place import score_places
 from sr_mj.scene import Goal, PlaceGoal, SceneConfig, make_scene
 from sr_mj.scene.placement import find_object, place_region
@@ -114,3 +115,22 @@ def test_without_a_reference_the_prior_decides(scene):
         scores = score_places(replace(scene, goal=goal), MOVED, candidates)
         np.testing.assert_allclose(scores, [0.05, 0.45, 0.25], rtol=1e-6)
     assert len(score_places(scene, MOVED, places(np.zeros((0, 3))))) == 0
+
+
+def test_a_place_that_the_object_falls_from_is_ruled_out(scene):
+    scene = with_goal(scene, "on", "tuna_can")
+    top = center(scene, "tuna_can") * [1, 1, 2]
+    vertices = find_object(scene, MOVED).asset.vertices
+    low = vertices[:, 2].max() + 0.003
+    # Over the edge, as a bad estimate of what is held may have it; from the air; just above.
+    poses = np.add(top, [[0.042, 0, low], [0, 0, low + 0.15], [0, 0, low]])
+    before = scene.data.qpos.copy()
+    scores = rule_out_falls(scene, MOVED, places(poses), np.array([12.0, 9.0, 11.0]), 10.0)
+    np.testing.assert_array_equal(scores, [7, 9, 11])
+    np.testing.assert_array_equal(scene.data.qpos, before)
+    assert stays(scene, MOVED, places(poses).Ts_world_tool[2])
+    # Nothing is tried that is not good otherwise.
+    low_scores = np.array([5.0, 4.0, 3.0])
+    np.testing.assert_array_equal(
+        rule_out_falls(scene, MOVED, places(poses), low_scores, 10.0), low_scores
+    )

@@ -9,6 +9,8 @@ from models.ur5 import HOME_QPOS
 from policy.actions import ActionCandidates
 from sr_mj.candidates.held import HeldObject
 from sr_mj.planning import PLACE_PHASES, Phase, Planner
+from sr_mj.planning.body import RobotBody
+from sr_mj.planning.clearance import Clearance
 
 
 def pose_down(x, y, z, yaw=0.0):
@@ -144,6 +146,20 @@ def test_the_transit_keeps_the_held_object_clear(planner, start):
         points = long.points_tool @ pose[:3, :3].T + pose[:3, 3]
         gaps = np.linalg.norm(wall[::4, None] - points[::4], axis=2)
         assert gaps.min() > 0.004
+
+
+def test_a_held_object_keeps_clear_of_the_arm(planner, start):
+    body = RobotBody()
+    placed = body.place(start[None])
+    # A rod from the tool to the middle of the forearm, as what was held would have to be.
+    elbow = placed.centers[0, np.flatnonzero(body.is_far)[20]]
+    pose = planner.kinematics.tool_pose(start)
+    rod = np.linspace(0, 1, 60)[:, None] * ((elbow - pose[:3, 3]) @ pose[:3, :3])
+    short = Clearance(body=body, held_points=rod[:20]).measure(start[None])
+    # Over the bin the tool is higher than 20 cm, and the forearm is higher still.
+    assert short[0] > 0.05
+    touching = Clearance(body=body, held_points=rod).measure(start[None])
+    assert touching[0] == pytest.approx(-body.radius_m[body.is_far][20] - 0.006, abs=2e-3)
 
 
 def test_a_long_object_is_lifted_over_the_wall_of_the_bin(planner, start):

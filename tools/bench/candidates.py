@@ -198,14 +198,16 @@ def look(scene: Scene, seed: int) -> tuple[GeometryCloud, np.ndarray]:
     return fuse(views, FusionConfig()), pixels
 
 
-def execute(scene: Scene, picks: ActionCandidates, held: np.ndarray) -> Counter[str]:
+def execute(
+    scene: Scene, cloud: GeometryCloud, picks: ActionCandidates, held: np.ndarray
+) -> Counter[str]:
     """Carry out the best candidate of every object, each from the same state of the scene."""
     planner, outcomes = Planner(), Counter()
     spec = mujoco.mjtState.mjSTATE_INTEGRATION
     state = np.empty(mujoco.mj_stateSize(scene.model, spec))
     mujoco.mj_getState(scene.model, scene.data, state, spec)
     for index in sorted(set(held.tolist()) - {-1}):
-        plan = planner.plan(picks, np.flatnonzero(held == index)[:1])
+        plan = planner.plan(picks, np.flatnonzero(held == index)[:1], obstacles=cloud.points)
         if plan is None:
             outcomes["unreachable"] += 1
             continue
@@ -232,7 +234,7 @@ def measure(config: BenchConfig, seed: int, outcomes: Counter[str]) -> dict[str,
     graspable = [i for i in visible if truth.is_graspable(int(i), sampler.config, rng)]
     first = [np.flatnonzero(held == i)[0] for i in visible if (held == i).any()]
     if config.execute:
-        outcomes.update(execute(scene, picks, held))
+        outcomes.update(execute(scene, cloud, picks, held))
     return {
         "visible": len(visible),
         "graspable": len(graspable),

@@ -21,7 +21,7 @@ from models.tabletop import build_tabletop
 
 GRAVITY = 9.81
 TOOL_HEIGHT_M, BELOW_TOOL_M = 0.5, 0.01
-# An object this far below the middle of the pads is no longer held.
+# An object that has moved this far between the pads, or is as far below, is no longer held.
 LOST_M = 0.05
 FINGER_SPEED = 0.15
 TURN_S = 2.0
@@ -35,16 +35,19 @@ class Load:
         name: Name in the catalogue.
         mass_kg: Mass that it is given.
         label: What to call it in the table.
+        off_center_m: How far its centre of mass is moved out of the grip, along the pads' width.
     """
 
     name: str
     mass_kg: float
     label: str
+    off_center_m: float = 0.0
 
 
 LOADS = (
     Load(name="tomato_soup_can", mass_kg=0.5, label="can, 0.5 kg"),
     Load(name="strawberry", mass_kg=0.02, label="strawberry, 20 g"),
+    Load(name="tomato_soup_can", mass_kg=1.0, label="can, 1 kg, off by 10 cm", off_center_m=0.1),
 )
 
 
@@ -96,11 +99,12 @@ def _option(**values: float) -> Change:
 
 
 SETTINGS: dict[str, tuple[Change, ...]] = {
-    "default (40 N, friction 1, condim 4, 4 ms)": (),
+    "default (80 N, friction 1, condim 4, 4 ms)": (),
     "2 N": (_force(2),),
     "10 N": (_force(10),),
     "20 N": (_force(20),),
-    "80 N": (_force(80),),
+    "40 N": (_force(40),),
+    "160 N": (_force(160),),
     "friction 0.5": (_pad(friction=0.5),),
     "friction 1.5": (_pad(friction=1.5),),
     "condim 3": (_pad(condim=3),),
@@ -119,7 +123,10 @@ def build(load: Load) -> mujoco.MjModel:
     gripper = root.attach(build_gripper())
     gripper.pos, gripper.quat = (0.5, 0, TOOL_HEIGHT_M + 0.145), (0, 1, 0, 0)
     asset = load_object(load.name)
-    held = root.attach(build_object(asset, name="load"))
+    item = build_object(asset, name="load")
+    inertial = item.find("body", "object").inertial
+    inertial.pos = np.array(inertial.pos) + np.array([0, load.off_center_m, 0])
+    held = root.attach(item)
     # A little below the middle of the pads, so that nothing tall leans on the palm.
     held.pos = np.array([0.5, 0, TOOL_HEIGHT_M - BELOW_TOOL_M]) - asset.center_of_mass
     held.add("freejoint")
@@ -191,9 +198,10 @@ def measure(load: Load, changes: tuple[Change, ...], carry_s: float) -> dict[str
     after, turned_after = hold.pose
     still = hold.run(1.0, vertical=GRAVITY)
     cosine = (np.trace(turned.T @ turned_after) - 1) / 2
-    is_lost = after[2] < TOOL_HEIGHT_M - LOST_M
+    slip_m = float(np.linalg.norm(after - before))
+    is_lost = slip_m > LOST_M or after[2] < TOOL_HEIGHT_M - LOST_M
     return {
-        "slip_mm": np.inf if is_lost else 1e3 * float(np.linalg.norm(after - before)),
+        "slip_mm": np.inf if is_lost else 1e3 * slip_m,
         "turn_deg": float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))),
         "depth_mm": 1e3 * hold.depth_m,
         "jitter_mm_s": 1e3 * float(np.sqrt((still[:, :3] ** 2).sum(axis=1).mean())),
