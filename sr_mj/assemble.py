@@ -1,6 +1,6 @@
 """Puts the stages together by name, for one scene."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -44,25 +44,33 @@ def check_policy_name(name: str) -> None:
         )
 
 
-def make_policy(name: str, scene: Scene, checkpoint: Path | None = None) -> Policy:
+def make_policy(
+    name: str,
+    scene: Scene,
+    checkpoint: Path | None = None,
+    *,
+    encoder: Collection[str] | None = None,
+) -> Policy:
     """Make a policy by name; `oracle` is the one that may read the scene.
 
     Args:
         name: One of `ALL_POLICIES`.
         scene: The scene that will be acted in.
         checkpoint: Weights for a learnt policy; those shipped when None.
+        encoder: Fingerprints of the encoder in use; a learnt policy must have been trained with one
+            of them. None to take any.
 
     Returns:
         The policy.
 
     Raises:
         UnknownNameError: If there is no such policy.
-        PolicyError: If its weights are missing.
+        PolicyError: If its weights are missing or were trained on other features.
     """
     check_policy_name(name)
     if name == OraclePolicy.name:
         return OraclePolicy(scene)
-    return load_policy(name, checkpoint=checkpoint)
+    return load_policy(name, checkpoint=checkpoint, encoder=encoder)
 
 
 def lifter_for(

@@ -197,7 +197,9 @@ def _run_episode(
     start = time.perf_counter()
     generator = load_generator(config.generator)
     scene = make_scene(scene_config)
-    policy = make_policy(config.policy, scene, config.checkpoint)
+    policy = make_policy(
+        config.policy, scene, config.checkpoint, encoder=lifter.encoder.fingerprints
+    )
     out, record, explain = config.out, config.record, config.explain
     if is_one_of_many:
         out = out and out / scene_config.title

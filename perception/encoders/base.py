@@ -56,6 +56,14 @@ class Encoder(Protocol):
         ...
 
     @property
+    def fingerprints(self) -> tuple[str, ...]:
+        """Fingerprints of the same encoder in every arithmetic, its own among them.
+
+        Their features agree up to rounding, so that what was learnt from one serves the others.
+        """
+        ...
+
+    @property
     def feature_dim(self) -> int:
         """C, the dimension of the shared feature space."""
         ...
@@ -164,6 +172,10 @@ def checked_text(text: str) -> str:
     if not stripped:
         raise InvalidTextError(f"Empty text {text!r}: expected at least one word.")
     return stripped
+
+
+PRECISIONS = (torch.float32, torch.bfloat16)
+"""Types in which an image tower may compute."""
 
 
 def compute_dtype(precision: Precision) -> torch.dtype:

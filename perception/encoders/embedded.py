@@ -24,6 +24,7 @@ from tokenizers import Tokenizer
 from torch import Tensor, nn
 
 from perception.encoders.base import (
+    PRECISIONS,
     Precision,
     TextFeatures,
     checked_text,
@@ -139,7 +140,13 @@ class EmbeddedEncoder:
         if self.config.mixture_share != 1:
             _tune(trunk, tuned, weights_dir)
         self._trunk = trunk.to(self._dtype).to(memory_format=torch.channels_last)
+        self._weights_dir = weights_dir
         self.fingerprint = _fingerprint(weights_dir, self.config, self._dtype)
+
+    @property
+    def fingerprints(self) -> tuple[str, ...]:
+        """Fingerprints of the same encoder in every arithmetic."""
+        return tuple(_fingerprint(self._weights_dir, self.config, dtype) for dtype in PRECISIONS)
 
     @property
     def trunk(self) -> EfficientNet:

@@ -16,6 +16,7 @@ from safetensors import SafetensorError
 from torch import Tensor, nn
 
 from perception.encoders.base import (
+    PRECISIONS,
     Precision,
     TextFeatures,
     checked_text,
@@ -89,7 +90,10 @@ class OpenClipVitEncoder:
         self.name = f"{architecture}:{source}"
         self._model = model.eval().requires_grad_(False)
         self._dtype = compute_dtype(self.config.precision)
-        self.fingerprint = _fingerprint(self.name, model, self.config, self._dtype)
+        self.fingerprints = tuple(
+            _fingerprint(self.name, model, self.config, dtype) for dtype in PRECISIONS
+        )
+        self.fingerprint = self.fingerprints[PRECISIONS.index(self._dtype)]
         self._tower = image_tower(cast(nn.Module, model.visual).to(self._dtype), self.name)
         self._text_tower = text_tower(model, self.name)
         self._tokenizer = _load_tokenizer(architecture)

@@ -33,6 +33,7 @@ class ColorEncoder:
 
     name = "color"
     fingerprint = "color-1"
+    fingerprints = ("color-1",)
     feature_dim = 3
 
     def __init__(self) -> None:

@@ -48,7 +48,7 @@ class RememberingEncoder:
         """Wrap an encoder."""
         self._encoder = encoder
         self.name, self.fingerprint = encoder.name, encoder.fingerprint
-        self.feature_dim = encoder.feature_dim
+        self.fingerprints, self.feature_dim = encoder.fingerprints, encoder.feature_dim
         self._remembered = functools.cache(encoder.encode_text)
 
     def encode_dense(self, images: Sequence[np.ndarray]) -> Tensor:

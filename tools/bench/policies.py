@@ -1,32 +1,29 @@
-"""Compare policies on the same scenes and seeds: random scenes, or fixed arrangements.
+"""Compare policies on the same random scenes, those for placing included, or on arrangements.
 
     python -m tools.bench.policies --policies oracle grounding random --seeds 0 20
     python -m tools.bench.policies --policies oracle --scene place8 --seeds 100 130
     python -m tools.bench.policies --policies oracle --suite place --split unseen --seeds 0 15
 
-Scenes `place8` and `pickplace8` get random goals with a place part. Writes one JSON line an episode
-as it ends, skips what the file already has, and prints success with 95 % Wilson intervals, the
-causes of failure, and how attempts ended.
+For development: unlike `python -m sr_mj.eval`, whose harness this uses, it runs only the policies
+that are named, and scenes `place8` and `pickplace8` get random goals with a place part. Episodes
+are kept as they end, and those that the folder already has are skipped. Prints success with 95 %
+Wilson intervals, the causes of failure, and how attempts ended.
 """
 
-import json
-from collections import Counter
-from collections.abc import Iterator
+import sys
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
 import tyro
 from tqdm import tqdm
 
+from sr_mj.evaluation.statistics import wilson
 from sr_mj.gl import select_backend
 
 if TYPE_CHECKING:
-    from models.workspace import Workspace
-    from perception.lifter import MultiViewLifter
-    from sr_mj.planning import Planner
+    from sr_mj.evaluation.plan import Episode
+    from sr_mj.evaluation.setting import Setting
     from sr_mj.scene import Scene
 
 
@@ -35,7 +32,7 @@ class BenchConfig:
     """What to run.
 
     Attributes:
-        policies: Names of policies.
+        policies: Names of policies, or NAME@CHECKPOINT.
         scene: Kind of random scene.
         suite: Arrangements to run instead.
         split: Objects.
@@ -43,9 +40,10 @@ class BenchConfig:
         attempts: Grasps an episode.
         perturb_cm: Standard deviation of an error added to executed positions.
         perturb_deg: Standard deviation of an error added to executed orientations.
-        encoder: Image and text encoder; "blank" gives every point the same feature, which spares
-            the time of a network to policies that do not look: oracle and random.
-        out: File of JSON lines.
+        encoder: Image and text encoder. Policies that do not look, oracle and random, are spared
+            it in any case; "blank" spares it to all.
+        workers: Processes.
+        out: Folder of results; an ending .jsonl is left out of its name.
     """
 
     policies: tuple[str, ...] = ("oracle", "grounding", "random")
@@ -57,138 +55,114 @@ class BenchConfig:
     perturb_cm: float = 0.0
     perturb_deg: float = 0.0
     encoder: str = "embedded"
-    out: Path = Path("outputs/policies.jsonl")
+    workers: int = 1
+    out: Path = Path("outputs/policies")
 
 
-def wilson_interval(successes: int, runs: int, z: float = 1.96) -> tuple[float, float]:
+def wilson_interval(successes: int, runs: int) -> tuple[float, float]:
     """Return the 95 % Wilson score interval of a success rate."""
-    rate, spread = successes / runs, z**2 / runs
-    center = (rate + spread / 2) / (1 + spread)
-    half = z * np.sqrt(rate * (1 - rate) / runs + spread / (4 * runs)) / (1 + spread)
-    return float(center - half), float(center + half)
+    interval = wilson(successes, runs)
+    return interval.low, interval.high
 
 
-def episodes(config: BenchConfig) -> Iterator[dict]:
-    """List what to run: policy, scene or arrangement, seed, and what else tells episodes apart."""
-    from models.arrangements.library import arrangement_names
-
-    names = (
-        [config.scene] if config.suite is None else arrangement_names(config.suite, config.split)
-    )
-    for policy in config.policies:
-        for name in names:
-            for seed in range(*config.seeds):
-                yield {
-                    "policy": policy,
-                    "name": name,
-                    "of_split": config.split,
-                    "run_seed": seed,
-                    "perturb": [config.perturb_cm, config.perturb_deg],
-                }
-
-
-def make_bench_scene(config: BenchConfig, name: str, seed: int) -> "Scene":
-    """Make the scene of an episode; arrangements are the same for every seed."""
+def make_bench_scene(episode: "Episode") -> "Scene":
+    """Make the random scene of an episode."""
     from sr_mj.scene import SceneConfig, make_scene
     from tools.bench.place_goals import make_place_scene
 
-    if config.suite is not None:
-        return make_scene(SceneConfig(arrangement=name))
-    if name in ("place8", "pickplace8"):
-        return make_place_scene(name, config.split, seed)
-    return make_scene(SceneConfig(scene=name, split=config.split, seed=seed))
+    split = "seen" if episode.split == "seen" else "unseen"
+    if episode.scene in ("place8", "pickplace8"):
+        return make_place_scene(episode.scene, split, episode.seed)
+    return make_scene(SceneConfig(scene=episode.scene, split=split, seed=episode.seed))
 
 
-def run_one(config: BenchConfig, episode: dict) -> dict:
-    """Run one episode and return its record."""
-    from sr_mj.account import episode_record
-    from sr_mj.assemble import assembled, make_policy
-    from sr_mj.episode import run_episode
-    from sr_mj.perturbation import PosePerturbation
+def bench_setting(config: BenchConfig) -> "Setting":
+    """Say what all episodes share."""
+    from perception.encoders import load_encoder
+    from sr_mj.evaluation.plan import read_policies
+    from sr_mj.evaluation.setting import BLANK, Setting
+    from sr_mj.provenance import git_revision, package_versions
 
-    seed = episode["run_seed"]
-    scene = make_bench_scene(config, episode["name"], seed)
-    perturbation = PosePerturbation(sigma_m=config.perturb_cm / 100, sigma_deg=config.perturb_deg)
-    with assembled(
-        scene,
-        lifter=_lifter(scene.workspace, config.encoder),
-        policy=make_policy(episode["policy"], scene),
-        planner=_planner(),
-        perturbation=perturbation if config.perturb_cm or config.perturb_deg else None,
-    ) as pipeline:
-        attempts = list(run_episode(scene, pipeline, seed=seed, max_attempts=config.attempts))
-    return {**episode, **episode_record(scene, attempts, config.attempts)}
+    is_blank = config.encoder == BLANK
+    chosen = {choice.label: choice for choice in read_policies(config.policies)}
+    # By its full name, so that other processes find it.
+    from tools.bench import policies
 
-
-@cache
-def _lifter(workspace: "Workspace", encoder: str) -> "MultiViewLifter":
-    from perception.lifter import MultiViewLifter
-    from sr_mj.assemble import lifter_config, lifter_for
-    from tools.bench.blank_encoder import BlankEncoder
-
-    if encoder == BlankEncoder.name:
-        return MultiViewLifter(BlankEncoder(), lifter_config(workspace))
-    return lifter_for(workspace, encoder)
+    return Setting(
+        policies=tuple(c for c in chosen.values() if _is_asked_for(c.label, config)),
+        encoder=config.encoder,
+        encoder_fingerprint=BLANK if is_blank else load_encoder(config.encoder).fingerprint,
+        attempts=config.attempts,
+        versions=package_versions(),
+        revision=git_revision(),
+        make_random_scene=policies.make_bench_scene,
+    )
 
 
-@cache
-def _planner() -> "Planner":
-    from sr_mj.planning import Planner
-
-    return Planner()
+def _is_asked_for(label: str, config: BenchConfig) -> bool:
+    return label in config.policies or "@" in label
 
 
-def cause(record: dict) -> str:
-    """Say why an episode failed: how its last attempt ended, and in which part."""
-    if not record["attempts"]:
-        return "nothing tried"
-    last = record["attempts"][-1]
-    part = "hand-over" if last["is_hand_over"] else last["kind"]
-    return f"{part}: {last['reason']}"
+def bench_episodes(config: BenchConfig, setting: "Setting") -> "tuple[Episode, ...]":
+    """List the episodes."""
+    from sr_mj.evaluation.plan import plan_random, plan_suites
 
-
-def report(records: list[dict]) -> None:
-    """Print a line a policy, then the causes of failure, then what failed."""
-    for policy in dict.fromkeys(record["policy"] for record in records):
-        mine = [record for record in records if record["policy"] == policy]
-        wins = sum(record["success"] for record in mine)
-        low, high = wilson_interval(wins, len(mine))
-        actions = np.mean([record["num_actions"] for record in mine])
-        attempts = [attempt for record in mine for attempt in record["attempts"]]
-        seconds = np.mean([sum(attempt["seconds"].values()) for attempt in attempts])
-        reasons = Counter(f"{a['kind']} {a['reason']}" for a in attempts)
-        print(
-            f"{policy:10s} {wins}/{len(mine)} = {wins / len(mine):.1%} "
-            f"[{low:.1%}, {high:.1%}], {actions:.2f} actions, {seconds:.1f} s an attempt"
+    is_perturbed = config.perturb_cm or config.perturb_deg
+    pose = f"pose-{config.perturb_cm:g}cm-{config.perturb_deg:g}deg"
+    conditions, seeds = (pose if is_perturbed else "clean",), range(*config.seeds)
+    if config.suite is None:
+        return plan_random(
+            config.scene, config.split, seeds, setting.policies, conditions=conditions
         )
-        failed = [record for record in mine if not record["success"]]
-        for reason, count in Counter(map(cause, failed)).most_common():
-            low, high = wilson_interval(count, len(mine))
-            print(f"  failed, {reason}: {count} = {count / len(mine):.1%} [{low:.1%}, {high:.1%}]")
-        print("  attempts: " + ", ".join(f"{name} {n}" for name, n in reasons.most_common()))
-        for record in failed:
-            print(f"    {record['name']} {record['run_seed']}: {record['goal']!r}, {cause(record)}")
+    return plan_suites(
+        [config.suite], [config.split], seeds, setting.policies, conditions=conditions
+    )
 
 
-def main(config: BenchConfig) -> None:
+def report(records: list[dict[str, Any]]) -> None:
+    """Print a line a policy, then the causes of failure, then what failed."""
+    from sr_mj.evaluation.summary import attempt_outcomes, by_policy, causes, score
+
+    for policy, mine in by_policy(records).items():
+        s = score(policy, mine)
+        wins = round(s.success.value * s.runs)
+        print(
+            f"{policy:10s} {wins}/{s.runs} = {s.success.value:.1%} "
+            f"[{s.success.low:.1%}, {s.success.high:.1%}], {s.steps:.2f} actions"
+        )
+        for cause, count in causes(mine):
+            share = wilson(count, s.runs)
+            ends = f"[{share.low:.1%}, {share.high:.1%}]"
+            print(f"  failed, {cause}: {count} = {share.value:.1%} {ends}")
+        print("  attempts: " + ", ".join(f"{name} {n}" for name, n in attempt_outcomes(mine)))
+        for record in mine:
+            if not record["success"]:
+                goal = record.get("goal", "")
+                print(f"    {record['scene']} {record['seed']}: {goal!r}, {record['cause']}")
+
+
+def main(config: BenchConfig) -> int:
     """Run what is missing, then report."""
     select_backend()
-    config.out.parent.mkdir(parents=True, exist_ok=True)
-    lines = config.out.read_text().splitlines() if config.out.exists() else []
-    records = {_key(record): record for record in map(json.loads, lines)}
-    wanted = [(_key(episode), episode) for episode in episodes(config)]
-    with config.out.open("a") as file:
-        for key, episode in tqdm([(k, e) for k, e in wanted if k not in records], desc="episodes"):
-            records[key] = run_one(config, episode)
-            file.write(json.dumps(records[key]) + "\n")
-            file.flush()
-    report([records[key] for key, _ in wanted])
+    from sr_mj.evaluation.pool import run_episodes
+    from sr_mj.evaluation.results import ResultFolder
+    from sr_mj.evaluation.setting import Identity
 
-
-def _key(record: dict) -> str:
-    names = ("policy", "name", "of_split", "run_seed", "perturb")
-    return json.dumps([record.get(name) for name in names])
+    setting = bench_setting(config)
+    episodes, identity = bench_episodes(config, setting), Identity(setting)
+    out = config.out.with_suffix("") if config.out.suffix == ".jsonl" else config.out
+    with ResultFolder(out, resume=True) as folder:
+        for episode in episodes:
+            if episode in folder.lines:
+                identity.check(episode, folder.lines[episode])
+        missing = [episode for episode in episodes if episode not in folder.lines]
+        running = run_episodes(missing, setting, workers=config.workers)
+        for done in tqdm(running, desc="episodes", total=len(missing)):
+            folder.add(done)
+        folder.finish()
+        report([folder.lines[episode] for episode in episodes])
+    return 0
 
 
 if __name__ == "__main__":
-    main(tyro.cli(BenchConfig, description=__doc__))
+    sys.exit(main(tyro.cli(BenchConfig, description=__doc__)))

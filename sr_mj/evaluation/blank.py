@@ -15,6 +15,7 @@ class BlankEncoder:
 
     name = "blank"
     fingerprint = "blank"
+    fingerprints = ("blank",)
     feature_dim = 4
 
     def encode_dense(self, images: Sequence[np.ndarray]) -> torch.Tensor:
