@@ -35,3 +35,11 @@ class MissingCheckpointError(PolicyError, FileNotFoundError):
 
 class InvalidCheckpointError(PolicyError, ValueError):
     """Weights or their card cannot be read, or do not fit the network."""
+
+
+class MissingDemonstrationsError(PolicyError, FileNotFoundError):
+    """A folder has no demonstrations in it, or does not exist."""
+
+
+class InvalidDemonstrationsError(PolicyError, ValueError):
+    """Demonstrations are damaged, of another version, or do not fit each other."""

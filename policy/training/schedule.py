@@ -1,0 +1,26 @@
+"""The learning rate over a run."""
+
+import math
+
+from policy.training.config import Schedule
+
+
+def rate_factor(step: int, *, schedule: Schedule, warmup: int, num_steps: int) -> float:
+    """Share of the highest learning rate that a step uses.
+
+    Args:
+        step: Number of the step, from 0.
+        schedule: "constant" or "cosine".
+        warmup: Steps over which it rises from zero.
+        num_steps: Steps of the whole run; where the cosine reaches zero.
+
+    Returns:
+        Above 0, at most 1.
+    """
+    if step < warmup:
+        return (step + 1) / warmup
+    if schedule == "constant":
+        return 1.0
+    # The step after the last one would be at zero: every step that is made moves the weights.
+    done = (step - warmup) / max(num_steps - warmup, 1)
+    return 0.5 * (1 + math.cos(math.pi * min(done, 1.0)))

@@ -1,0 +1,1 @@
+"""Collecting demonstrations: scenes, goals, the expert's decisions, workers, folders."""
