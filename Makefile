@@ -8,8 +8,9 @@ ARGS ?=
 run: setup
 	$(PYTHON) -m sr_mj.run --scene cluttered15 $(ARGS)
 
+# Two workers of one thread each: threads of several processes would wait for each other's cores.
 test: setup
-	$(PYTHON) -m pytest $(ARGS)
+	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -n 2 --dist loadfile $(ARGS)
 
 setup:
 	@VENV=$(VENV) bash tools/setup.sh

@@ -45,6 +45,12 @@ def run_command(config_type: type[Config], body: Callable[[Config], int], descri
     except (SrMjError, ModelsError, PerceptionError, PolicyError) as error:
         print(f"error: {error}", file=sys.stderr)
         status = USAGE_ERROR
+    except OSError as error:
+        # A path that cannot be read or written, a full disk; anything else is a fault of ours.
+        if error.filename is None:
+            raise
+        print(f"error: {error.filename}: {error.strerror}.", file=sys.stderr)
+        status = USAGE_ERROR
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         status = 130

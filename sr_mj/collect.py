@@ -9,7 +9,6 @@ split, so that none of the evaluation's is among them.
 """
 
 import contextlib
-import os
 import sys
 import time
 from dataclasses import dataclass
@@ -150,19 +149,13 @@ def _work(config: CollectConfig, schedule: "Schedule") -> None:
 
 
 def _results(config: CollectConfig, schedule: "Schedule") -> "Generator[SceneResult]":
+    from sr_mj.collecting.pool import run_scenes
     from sr_mj.collecting.start import start_worker
     from sr_mj.collecting.work import WorkSetting
 
     setting = WorkSetting(encoder=config.encoder, allow_download=config.allow_download)
     make_work = partial(start_worker, setting)
-    if config.ray is not None:
-        from sr_mj.collecting.ray_pool import run_on_ray
-
-        return run_on_ray(make_work, schedule.next_task, config.ray, config.workers)
-    from sr_mj.collecting.pool import run_here
-
-    num_workers = config.workers or len(os.sched_getaffinity(0))
-    return run_here(make_work, schedule.next_task, num_workers)
+    return run_scenes(make_work, schedule.next_task, workers=config.workers, ray=config.ray)
 
 
 def _account(config: CollectConfig, schedule: "Schedule", before: int, seconds: float) -> None:

@@ -10,7 +10,7 @@ from sr_mj.gl import select_backend
 # dm_control imports GLFW, which warns about a missing display on every headless machine.
 warnings.filterwarnings("ignore", message=".*DISPLAY.*")
 select_backend()
-torch.set_num_threads(2)
+torch.set_num_threads(min(2, torch.get_num_threads()))
 
 
 @pytest.fixture(scope="session")

@@ -1,14 +1,12 @@
 """Makes a worker in a fresh process; imports nothing heavy before the process is prepared."""
 
 import warnings
-from functools import cache
 
 from sr_mj.collecting.work import Work, WorkSetting
 
 
-@cache
 def start_worker(setting: WorkSetting) -> Work:
-    """Choose the graphics library, then load all that a scene needs; once a process.
+    """Choose the graphics library, then load all that a scene needs.
 
     Args:
         setting: What all scenes share.

@@ -15,7 +15,7 @@ Task = TypeVar("Task", bound=Hashable)
 Result = TypeVar("Result")
 
 NUM_TRIES = 2
-"""How often a piece of work is begun; a process that dies takes only one with it."""
+"""How often a piece of work is begun by default; a process that dies takes only one with it."""
 
 SINGLE_THREADED = {
     name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -40,6 +40,7 @@ def run_in_processes(
     *,
     workers: int,
     renew_after: int | None = None,
+    num_tries: int = NUM_TRIES,
 ) -> Generator[Result]:
     """Do pieces of work until there are no more.
 
@@ -47,10 +48,11 @@ def run_in_processes(
         make_work: Makes the function that does a piece; called once in every process, to which it
             is sent, so that it must be picklable.
         next_task: Returns the next piece, or None; asked whenever a process is free.
-        give_up: Says what comes of a piece whose process has died `NUM_TRIES` times.
+        give_up: Says what comes of a piece whose process has died `num_tries` times.
         workers: Number of processes.
         renew_after: Pieces after which a process is replaced, so that whatever libraries keep of
             each is given back; never when None.
+        num_tries: How often a piece is begun.
 
     Yields:
         What came of each piece, as it ends. Closing the generator ends the processes.
@@ -78,7 +80,7 @@ def run_in_processes(
                 except (EOFError, ConnectionResetError):
                     active.remove(item)
                     item.process.join()
-                    if tries[item.task] < NUM_TRIES:
+                    if tries[item.task] < num_tries:
                         again.append(item.task)
                     else:
                         yield give_up(item.task)

@@ -1,6 +1,7 @@
 """Does pieces of work on a Ray cluster; the machine that asks gets all results."""
 
 import logging
+import os
 import socket
 from collections import Counter, deque
 from collections.abc import Callable, Generator
@@ -31,29 +32,33 @@ def run_on_ray(
     next_task: Callable[[], Task | None],
     give_up: Callable[[Task], Result],
     *,
-    workers: int,
+    workers: int | None,
     address: str,
     renew_after: int | None = None,
+    num_tries: int = NUM_TRIES,
 ) -> Generator[Result]:
     """Do pieces of work until there are no more, each in an actor with one processor.
 
     Args:
         make_work: Makes the function that does a piece; called once in every actor.
         next_task: Returns the next piece, or None; asked whenever an actor is free.
-        give_up: Says what comes of a piece whose actor has died `NUM_TRIES` times. Ray starts
-            actors that die again, on another machine if need be.
-        workers: Number of actors.
+        give_up: Says what comes of a piece whose actor, or the actor's machine, has died
+            `num_tries` times.
+        workers: Number of actors; as many as the cluster has processors when None.
         address: Where the cluster is: "auto", "HOST:PORT", "ray://HOST:PORT", or `LOCAL`.
         renew_after: Pieces after which an actor is replaced; never when None.
+        num_tries: How often a piece is begun.
 
     Yields:
         What came of each piece, as it ends. Closing the generator leaves the cluster.
 
     Raises:
-        ConfigError: If Ray is not installed, or there is no cluster at that address.
+        ConfigError: If Ray is not installed, there is no cluster at that address, or its machines
+            can't load this package.
     """
     ray = _connect(address, workers)
-    actor = ray.remote(num_cpus=1, max_restarts=-1)(_Actor)
+    workers = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
+    actor = ray.remote(num_cpus=1)(_Actor)
     again: deque[Task] = deque()
     tries: Counter[Task] = Counter()
     idle: deque[Any] = deque()
@@ -75,24 +80,49 @@ def run_on_ray(
                 return
             (ready,), _ = ray.wait(list(active), num_returns=1)
             free, task = active.pop(ready)
-            if renew_after is not None and num_begun[free] >= renew_after:
-                ray.kill(free)
-            else:
-                idle.append(free)
             try:
                 result = ray.get(ready)
-            except ray.exceptions.RayActorError:
-                if tries[task] < NUM_TRIES:
+            except ray.exceptions.RayError as error:
+                if not _has_died(ray, error):
+                    raise _cannot_work(address, error) from error
+                # Another takes its place, on another machine if need be.
+                ray.kill(free)
+                if tries[task] < num_tries:
                     again.append(task)
                 else:
                     yield give_up(task)
                 continue
+            if renew_after is not None and num_begun[free] >= renew_after:
+                ray.kill(free)
+            else:
+                idle.append(free)
             yield result
     finally:
         ray.shutdown()
 
 
-def _connect(address: str, workers: int) -> Any:
+def _has_died(ray: Any, error: Exception) -> bool:
+    """Tell whether a process or a machine is gone, rather than unfit from the start."""
+    if isinstance(error, ray.exceptions.RayActorError):
+        return not getattr(error, "actor_init_failed", False)
+    lost = (
+        ray.exceptions.NodeDiedError,
+        ray.exceptions.ObjectLostError,
+        ray.exceptions.OutOfMemoryError,
+        ray.exceptions.WorkerCrashedError,
+    )
+    return isinstance(error, lost)
+
+
+def _cannot_work(address: str, error: Exception) -> ConfigError:
+    reason = str(error).strip().splitlines()[-1]
+    return ConfigError(
+        f"The workers at {address!r} can't do the work ({reason}); every machine needs this "
+        "package in the same version."
+    )
+
+
+def _connect(address: str, workers: int | None) -> Any:
     try:
         import ray
     except ModuleNotFoundError:
@@ -101,6 +131,8 @@ def _connect(address: str, workers: int) -> Any:
         ) from None
     # A cluster of other machines has its own number of processors.
     local = {"num_cpus": workers, "include_dashboard": False} if address == LOCAL else {}
+    # Nothing reaches a network unless it is asked to.
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         _check_address(address)
         ray.init(

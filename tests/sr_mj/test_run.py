@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from models.arrangements.library import summary
+from policy.registry import POLICY_NAMES
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -177,7 +178,7 @@ def test_exports_a_scene(command, tmp_path):
     assert (tmp_path / "scene" / "scene.xml").exists()
 
 
-POLICIES = "grounding, random, sr, oracle"
+POLICIES = ", ".join((*POLICY_NAMES, "oracle"))
 SCENES = f"cluttered15, place8, pickplace8, heavy30, single, empty, {summary()}"
 CASE = "give me the pear\n0\nassets/015.urdf 0.5 0 0.2 0 0 0\n"
 
