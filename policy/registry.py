@@ -2,38 +2,64 @@
 
 import difflib
 from collections.abc import Callable, Collection
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from policy.base import Policy
 from policy.errors import InvalidConfigError, UnknownPolicyError
 
 Fingerprints = str | Collection[str] | None
+_Loader = Callable[[Path | None, Fingerprints], Policy]
+
+# Imported on first use: torch takes seconds, and only the learnt policies need it.
+_WITHOUT_WEIGHTS = {
+    "grounding": "policy.grounding.GroundingPolicy",
+    "random": "policy.baselines.random.RandomPolicy",
+    "clip-grounding": "policy.baselines.clip_grounding.ClipGroundingPolicy",
+    "lerf-togo": "policy.baselines.lerf_togo.LerfTogoPolicy",
+    "think-grasp": "policy.baselines.think_grasp.ThinkGraspPolicy",
+    "vlp": "policy.baselines.vlp.VlpPolicy",
+}
+_LEARNT = {
+    "base": "policy.baselines.ablations.BasePolicy",
+    "sr-a": "policy.baselines.ablations.SRAPolicy",
+}
 
 
-def _load_grounding(checkpoint: Path | None, _: Fingerprints) -> Policy:
-    from policy.grounding import GroundingPolicy
-
-    _refuse_checkpoint("grounding", checkpoint)
-    return GroundingPolicy()
+def _find(home: str) -> Any:
+    module, _, name = home.rpartition(".")
+    return getattr(import_module(module), name)
 
 
-def _load_random(checkpoint: Path | None, _: Fingerprints) -> Policy:
-    from policy.baselines.random import RandomPolicy
+def _without_weights(name: str) -> _Loader:
+    def load(checkpoint: Path | None, _: Fingerprints) -> Policy:
+        if checkpoint is not None:
+            raise InvalidConfigError(
+                f"checkpoint: got {checkpoint} for the policy {name!r}, which has no weights. "
+                "Leave it out, or use the policy 'sr'."
+            )
+        return _find(_WITHOUT_WEIGHTS[name])()
 
-    _refuse_checkpoint("random", checkpoint)
-    return RandomPolicy()
+    return load
+
+
+def _learnt(name: str) -> _Loader:
+    def load(checkpoint: Path | None, encoder: Fingerprints) -> Policy:
+        return _find(_LEARNT[name]).from_checkpoint(checkpoint, encoder=encoder)
+
+    return load
 
 
 def _load_sr(checkpoint: Path | None, encoder: Fingerprints) -> Policy:
-    # torch takes seconds to import; the other policies do without it.
     from policy.sr import DEFAULT_CHECKPOINT, SRPolicy
 
     return SRPolicy.from_checkpoint(checkpoint or DEFAULT_CHECKPOINT, encoder=encoder)
 
 
-_LOADERS: dict[str, Callable[[Path | None, Fingerprints], Policy]] = {
-    "grounding": _load_grounding,
-    "random": _load_random,
+_LOADERS: dict[str, _Loader] = {
+    **{name: _without_weights(name) for name in _WITHOUT_WEIGHTS},
+    **{name: _learnt(name) for name in _LEARNT},
     "sr": _load_sr,
 }
 
@@ -62,7 +88,8 @@ def load_policy(
         UnknownPolicyError: If there is no such policy.
         InvalidConfigError: If a checkpoint is given to a policy that learns nothing.
         MissingCheckpointError: If a learnt policy has no weights.
-        InvalidCheckpointError: If the weights can't be read or were trained on other features.
+        InvalidCheckpointError: If the weights can't be read, were trained on other features, or
+            are those of another variant of the network.
     """
     if name not in _LOADERS:
         close = difflib.get_close_matches(name, POLICY_NAMES, n=1)
@@ -71,11 +98,3 @@ def load_policy(
             f"Unknown policy {name!r}. Policies: {', '.join(POLICY_NAMES)}.{hint}"
         )
     return _LOADERS[name](None if checkpoint is None else Path(checkpoint), encoder)
-
-
-def _refuse_checkpoint(name: str, checkpoint: Path | None) -> None:
-    if checkpoint is not None:
-        raise InvalidConfigError(
-            f"checkpoint: got {checkpoint} for the policy {name!r}, which has no weights. "
-            "Leave it out, or use the policy 'sr'."
-        )

@@ -51,8 +51,9 @@ class RunConfig:
     """Instruction in free words, such as "give me the banana, put it near the bowl"; drawn from
     templates by default."""
     policy: str = "grounding"
-    """How a grasp or place is chosen: grounding, random, sr (needs trained weights), or oracle,
-    which reads ground truth and marks the ceiling."""
+    """How a grasp or place is chosen: grounding; the baselines random, clip-grounding, lerf-togo,
+    think-grasp, vlp; sr, base, sr-a (need trained weights); or oracle, which reads ground truth and
+    marks the ceiling."""
     generator: str = "antipodal"
     """Where grasps come from: antipodal (our sampler), or a learnt generator's file:PATH or
     http://HOST:PORT/PATH (docs/generators.md)."""

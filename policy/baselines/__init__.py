@@ -1,1 +1,1 @@
-"""Policies that need no training, to compare the learnt one with."""
+"""Policies to compare the learnt one with."""

@@ -9,12 +9,14 @@ from policy.base import Policy
 from policy.errors import InvalidConfigError, MissingCheckpointError, UnknownPolicyError
 from policy.registry import POLICY_NAMES, load_policy
 
+NAMES = "grounding, random, clip-grounding, lerf-togo, think-grasp, vlp, base, sr-a, sr"
+
 
 def test_names() -> None:
-    assert POLICY_NAMES == ("grounding", "random", "sr")
+    assert POLICY_NAMES == tuple(NAMES.split(", "))
 
 
-@pytest.mark.parametrize("name", ["grounding", "random"])
+@pytest.mark.parametrize("name", NAMES.split(", ")[:6])
 def test_policies_without_weights(name: str) -> None:
     loaded = load_policy(name)
     assert isinstance(loaded, Policy)
@@ -24,12 +26,12 @@ def test_policies_without_weights(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("oracle", "Unknown policy 'oracle'. Policies: grounding, random, sr."),
+        ("oracle", f"Unknown policy 'oracle'. Policies: {NAMES}."),
         (
             "groundin",
-            "Unknown policy 'groundin'. Policies: grounding, random, sr. Did you mean 'grounding'?",
+            f"Unknown policy 'groundin'. Policies: {NAMES}. Did you mean 'grounding'?",
         ),
-        ("", "Unknown policy ''. Policies: grounding, random, sr."),
+        ("", f"Unknown policy ''. Policies: {NAMES}."),
     ],
 )
 def test_unknown_policy(name: str, message: str) -> None:

@@ -1,0 +1,70 @@
+"""CLIP-Grounding: find the object by the similarity of its box, then grasp it anyhow."""
+
+import numpy as np
+from jaxtyping import Float
+
+from policy.actions import ActionCandidates, ActionScores
+from policy.baselines.segments import means, owners, ranks, segment
+from policy.grounding import GroundingPolicy
+from policy.observation import Observation
+
+
+class ClipGroundingPolicy:
+    """Grasps the object whose box is most similar to the phrase, with a grasp drawn at random.
+
+    The original compares CLIP's feature of the image inside each detected bounding box with the
+    instruction, and draws one of the grasps that belong to the best box. Simplified here:
+
+    - Boxes are those of the cloud's segments (`policy.baselines.segments`), in space instead of in
+      an image. As in the original, a box holds whatever reaches into it.
+    - The feature of a box is the normalised mean of the features of its points, not that of a
+      separate crop; it is compared with the phrase that says what to pick.
+    - A grasp belongs to the segment of the nearest point. If none on the best object can be
+      carried out, the next most similar object follows.
+    - The original only grasps. In the place phase, this is the policy `grounding`.
+    """
+
+    name = "clip-grounding"
+
+    def __init__(self) -> None:
+        """Make the policy."""
+        self._placing = GroundingPolicy()
+
+    def score(
+        self, observation: Observation, candidates: ActionCandidates, rng: np.random.Generator
+    ) -> ActionScores:
+        """Score grasps by the rank of their object, and at random within an object.
+
+        Args:
+            observation: The scene's feature cloud and the instruction.
+            candidates: K candidates; K may be 0.
+            rng: Draws the order of the grasps of an object; nothing for places.
+
+        Returns:
+            K logits: the rank of the object among all, 0 for the least similar, plus a fraction
+            drawn for each grasp. Without points, the fraction alone.
+        """
+        if candidates.kind == "place":
+            return self._placing.score(observation, candidates, rng)
+        draws = rng.permutation(len(candidates)) / max(len(candidates), 1)
+        if not (observation.num_points and len(candidates)):
+            return ActionScores(logits=draws)
+        labels = segment(observation.points)
+        similarity = _box_similarity(observation, labels)
+        chosen = owners(observation.points, labels, candidates.positions)
+        return ActionScores(logits=ranks(similarity)[chosen] + draws)
+
+
+def _box_similarity(observation: Observation, labels: np.ndarray) -> Float[np.ndarray, " S"]:
+    """Cosine of the phrase with the mean feature of what is in each segment's box."""
+    points, features = observation.points, observation.features.astype(np.float64)
+    phrase = observation.phrase_pooled
+    phrase = observation.text_pooled if phrase is None else phrase
+    is_small = np.isneginf(means(observation.similarity, labels))
+    similarity = np.full(len(is_small), -np.inf)
+    for label in np.flatnonzero(~is_small):
+        mine = points[labels == label]
+        is_inside = ((points >= mine.min(axis=0)) & (points <= mine.max(axis=0))).all(axis=1)
+        mean = features[is_inside].mean(axis=0)
+        similarity[label] = mean @ phrase / max(float(np.linalg.norm(mean)), 1e-9)
+    return similarity
