@@ -33,6 +33,7 @@ _PACKAGES = (
     "safetensors",
     "numpy",
     "scipy",
+    "h5py",
     "shapely",
     "trimesh",
     "manifold3d",

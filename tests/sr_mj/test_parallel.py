@@ -114,7 +114,7 @@ class Work:
         begun = len((self.log / task.name).read_text().split())
         if begun <= self.deadly.get((task.phase, task.number), 0):
             os.kill(os.getpid(), signal.SIGKILL)
-        if task.number == 5:
+        if (task.phase, task.number) == ("pick", 5):
             raise RuntimeError("a fault")
         return SceneResult(task=task, file_name=f"{task.name}.none.json", content=b"{}",
                            stored={task.phase: 2})
@@ -179,7 +179,8 @@ def check_killed_and_given_up(tmp_path, make_work, **where):
     assert len(set(begun_by(tmp_path, lost.task))) == len(begun_by(tmp_path, lost.task)) == 3
     (fault,) = [result for result in found if result.error]
     assert fault.task.number == 5 and fault.error.endswith("RuntimeError: a fault\n")
-    assert schedule.stored == {"pick": 12, "place": 8}
+    # The other worker may have been at one more scene of a phase when that was complete.
+    assert schedule.stored["pick"] in (12, 14) and schedule.stored["place"] in (8, 10)
 
 
 def test_scenes_here_survive_killed_processes(tmp_path, make_work):
