@@ -127,17 +127,20 @@ def _angle_to_axes_deg(directions, yaws_deg):
 @pytest.mark.parametrize("yaw_deg", [0, 25, 70])
 def test_box_is_closed_on_across_its_faces(yaw_deg):
     box = _placed(trimesh.creation.box((0.07, 0.04, 0.05)), yaw_deg=yaw_deg)
-    picks = _pick(_look([box]))
-    assert len(picks) > 15
-    best = slice(0, len(picks) // 3)
-    closing = picks.Ts_world_tool[best, :3, 0]
+    cloud = _look([box])
+    # One draw has a dozen of them: too few for a share.
+    draws = [_pick(cloud, seed=seed) for seed in range(4)]
+    assert min(len(picks) for picks in draws) > 15
+    best = [picks.take(np.arange(len(picks) // 3)) for picks in draws]
+    closing = np.concatenate([picks.Ts_world_tool[:, :3, 0] for picks in best])
+    width_m = np.concatenate([picks.width_m for picks in best])
     assert (np.abs(closing[:, 2]) < np.sin(np.radians(15))).all()
     angle = _angle_to_axes_deg(closing, [yaw_deg, yaw_deg + 90])
     assert np.median(angle) < 7
-    assert np.mean(angle < 20) > 0.75
-    sides = np.abs(picks.width_m[best, None] - [0.04, 0.07]).min(axis=1)
+    assert np.mean(angle < 20) >= 0.8
+    sides = np.abs(width_m[:, None] - [0.04, 0.07]).min(axis=1)
     assert np.median(sides) < 0.003
-    assert np.mean(sides < 0.008) > 0.75
+    assert np.mean(sides < 0.008) > 0.8
 
 
 @pytest.mark.parametrize(
