@@ -65,6 +65,10 @@ class Executor:
         scene: The scene; its `data` is stepped.
         config: Thresholds and limits.
         on_step: Called after every simulation step.
+
+    Attributes:
+        T_world_grasp: Pose (4, 4) of the tool, by its joints, at which it last closed on something;
+            None before.
     """
 
     def __init__(
@@ -74,12 +78,7 @@ class Executor:
         self.config = config or ExecutionConfig()
         self.drive = RobotDrive(scene, self.config.drive, on_step)
         self._scene = scene
-        self._T_world_grasp: np.ndarray | None = None
-
-    @property
-    def T_world_grasp(self) -> np.ndarray | None:
-        """Pose (4, 4) of the tool, by its joints, at which it last closed on something."""
-        return self._T_world_grasp
+        self.T_world_grasp: np.ndarray | None = None
 
     def execute(self, plan: Plan, *, keep_target: bool = False) -> Outcome:
         """Execute a plan to its end, and judge it by the objects' motion.
@@ -141,7 +140,7 @@ class Executor:
         if not self.drive.feels_object:
             self._go_back(segments, (Phase.APPROACH, Phase.TRANSIT))
             return Reason.EMPTY_CLOSE, None
-        self._T_world_grasp = self.drive.T_world_tool
+        self.T_world_grasp = self.drive.T_world_tool
         self._move(segments[Phase.LIFT])
         held = judge.lifted_object(self.config.min_rise_m)
         grip = np.zeros(3) if held is None else judge.position_in_tool(held)

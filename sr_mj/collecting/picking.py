@@ -6,11 +6,11 @@ import numpy as np
 
 from models.objects.words import ObjectWords
 from sr_mj.collecting.expert import Choice, Expert, Seen
-from sr_mj.collecting.states import SceneState
 from sr_mj.collecting.wordings import reword_pick
 from sr_mj.instruction import PhaseText
 from sr_mj.scene import Goal, Scene, find_targets
 from sr_mj.scene.goals import draw_goal
+from sr_mj.scene.state import SceneState
 
 NUM_PARAPHRASES = 3
 

@@ -10,12 +10,12 @@ from perception.relations import INSIDE_RELATIONS, OUTSIDE_RELATIONS
 from sr_mj.collecting.crowds import OPEN_CATEGORIES
 from sr_mj.collecting.expert import Expert, Seen
 from sr_mj.collecting.picking import NUM_PARAPHRASES, words_on_table
-from sr_mj.collecting.states import SceneState
 from sr_mj.collecting.wordings import reword_pick, reword_place
 from sr_mj.instruction import PhaseText, place_text
 from sr_mj.scene import Goal, PlaceGoal, Scene, find_goal
 from sr_mj.scene.goals import draw_goal
 from sr_mj.scene.placement import find_object, footprint
+from sr_mj.scene.state import SceneState
 
 _NUM_HAND_OVERS = 4
 _DRAWS_PER_GOAL = 3

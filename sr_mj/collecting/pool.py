@@ -44,7 +44,7 @@ def run_scenes(
     if ray is None:
         yield from run_in_processes(
             make_attempt,
-            next_task,
+            lambda _: next_task(),
             _give_up,
             workers=workers or len(os.sched_getaffinity(0)),
             renew_after=RENEW_AFTER,
@@ -55,7 +55,7 @@ def run_scenes(
 
         yield from run_on_ray(
             make_attempt,
-            next_task,
+            lambda _: next_task(),
             _give_up,
             workers=workers,
             address=ray,

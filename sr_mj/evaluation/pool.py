@@ -1,7 +1,9 @@
 """Runs many episodes, each in a process that runs one after another."""
 
 import warnings
+from collections import deque
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
 from functools import partial
 
 from sr_mj.evaluation.lines import Done, result_line
@@ -18,9 +20,10 @@ def run_episodes(
 ) -> Generator[Done]:
     """Run episodes.
 
-    Each process has one thread, whatever their number: sums then add up in the same order, and the
-    same episode gives the same line everywhere. An episode whose process dies again and again
-    counts as a failure.
+    Policies of the same scene and seed are given to the same process, one after another, as they
+    share how the episode begins. Each process has one thread, whatever their number: sums then add
+    up in the same order, and the same episode gives the same line everywhere. An episode whose
+    process dies again and again counts as a failure.
 
     Args:
         episodes: What to run.
@@ -35,10 +38,7 @@ def run_episodes(
     Raises:
         ConfigError: If Ray is not installed, or there is no cluster at that address.
     """
-    waiting, identity = iter(episodes), Identity(setting)
-
-    def next_episode() -> Episode | None:
-        return next(waiting, None)
+    waiting, identity = _Waiting(episodes), Identity(setting)
 
     def give_up(episode: Episode) -> Done:
         error = f"the process that ran it died {NUM_TRIES} times"
@@ -48,19 +48,52 @@ def run_episodes(
     make_work = partial(make_runner, setting)
     if ray is None:
         yield from run_in_processes(
-            make_work, next_episode, give_up, workers=workers, renew_after=RENEW_AFTER
+            make_work, waiting.next_after, give_up, workers=workers, renew_after=RENEW_AFTER
         )
     else:
         from sr_mj.parallel.ray_cluster import run_on_ray
 
         yield from run_on_ray(
             make_work,
-            next_episode,
+            waiting.next_after,
             give_up,
             workers=workers,
             address=ray,
             renew_after=RENEW_AFTER,
         )
+
+
+class _Waiting:
+    """Episodes that nobody has begun, in groups that differ in their policy alone.
+
+    Args:
+        episodes: In the order in which they are to be run.
+    """
+
+    def __init__(self, episodes: Sequence[Episode]) -> None:
+        self._groups: dict[Episode, deque[Episode]] = {}
+        for episode in episodes:
+            self._groups.setdefault(_group(episode), deque()).append(episode)
+        self._begun: set[Episode] = set()
+
+    def next_after(self, last: Episode | None) -> Episode | None:
+        """Take an episode of the last one's group, or else one that nobody has begun, or any."""
+        if not self._groups:
+            return None
+        group = None if last is None else _group(last)
+        if group not in self._groups:
+            group = next((g for g in self._groups if g not in self._begun), None)
+        if group is None:
+            group = max(self._groups, key=lambda g: len(self._groups[g]))
+        self._begun.add(group)
+        episode = self._groups[group].popleft()
+        if not self._groups[group]:
+            del self._groups[group]
+        return episode
+
+
+def _group(episode: Episode) -> Episode:
+    return replace(episode, policy="")
 
 
 def make_runner(setting: Setting) -> Callable[[Episode], Done]:

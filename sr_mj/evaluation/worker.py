@@ -3,6 +3,7 @@
 import time
 import traceback
 from collections import Counter
+from contextlib import ExitStack
 from dataclasses import replace
 
 from models.arrangements.paraphrases import paraphrases
@@ -11,20 +12,24 @@ from perception.encoders import load_encoder
 from perception.encoders.base import Encoder
 from perception.lifter import MultiViewLifter
 from policy.base import Policy
+from policy.baselines.random import RandomPolicy
 from sr_mj.account import episode_record
 from sr_mj.assemble import assembled, lifter_config
 from sr_mj.attempt import Attempt
+from sr_mj.beginning import Beginning
 from sr_mj.candidates.external import load_generator
 from sr_mj.candidates.generator import CandidateGenerator
 from sr_mj.episode import run_episode
 from sr_mj.evaluation.blank import BlankEncoder
-from sr_mj.evaluation.conditions import Condition, read_condition
+from sr_mj.evaluation.conditions import read_condition
 from sr_mj.evaluation.lines import Done, result_line
 from sr_mj.evaluation.noisy import NoisyPoints
 from sr_mj.evaluation.plan import Episode
 from sr_mj.evaluation.setting import BLANK, Identity, Setting, load_choice
+from sr_mj.evaluation.shared import SharedScene
 from sr_mj.evaluation.snapshots import save_snapshots
 from sr_mj.oracle import OraclePolicy
+from sr_mj.pipeline import Pipeline
 from sr_mj.planning import Planner
 from sr_mj.scene import Scene, SceneConfig, make_scene
 
@@ -47,19 +52,31 @@ class Worker:
         self._policies: dict[str, Policy] = {}
         self._generator: CandidateGenerator | None = None
         self._planner = Planner()
+        self._shared: SharedScene | None = None
+        self._open = ExitStack()
 
     def run(self, episode: Episode) -> Done:
-        """Run an episode. An exception ends it as a failure, and is told in its record."""
-        start = time.perf_counter()
+        """Run an episode. An exception ends it as a failure, and is told in its record.
+
+        Scene, hand-over and first look are kept for the next episode, if it begins alike; seconds
+        are those that the episode would have taken alone.
+        """
+        start, before_s = time.perf_counter(), 0.0
         attempts: list[Attempt] = []
         scene, error, trace = None, None, None
         try:
-            scene = self._make_scene(episode)
-            self._act(episode, scene, attempts)
+            shared = self._shared_scene(episode)
+            scene = shared.scene
+            encoder = self._setting.encoder_for(episode.policy)
+            pipeline, beginning = shared.begin(encoder, self._policy(episode, scene))
+            before_s, start = shared.seconds(encoder), time.perf_counter()
+            self._act(episode, scene, pipeline, beginning, attempts)
         except Exception as exception:
             error = f"{type(exception).__name__}: {exception}".splitlines()[0]
             trace = traceback.format_exc()
-        seconds = Counter({"total": time.perf_counter() - start})
+            # What broke may have left it half changed.
+            self._leave()
+        seconds = Counter({"total": before_s + time.perf_counter() - start})
         for attempt in attempts:
             seconds.update(attempt.seconds)
         told = {} if scene is None else episode_record(scene, attempts, self._setting.attempts)
@@ -69,6 +86,46 @@ class Worker:
             seconds={name: round(value, 3) for name, value in seconds.items()},
             traceback=trace,
         )
+
+    def _shared_scene(self, episode: Episode) -> SharedScene:
+        """Return the scene of the last episode if this one begins alike, else a new one."""
+        if self._shared is not None and self._shared.fits(episode):
+            return self._shared
+        self._leave()
+        start = time.perf_counter()
+        setting, condition = self._setting, read_condition(episode.condition)
+        if self._generator is None:
+            self._generator = load_generator(setting.generator)
+        scene = self._make_scene(episode)
+
+        def lifter(encoder: str) -> MultiViewLifter:
+            return self._lifter(scene.workspace, encoder)
+
+        pipeline = self._open.enter_context(
+            assembled(
+                scene,
+                lifter=lifter(BLANK),
+                policy=RandomPolicy(),
+                generator=self._generator,
+                planner=self._planner,
+                perturbation=condition.perturbation(),
+                keep_unreachable=setting.keep_unreachable,
+            )
+        )
+        self._shared = SharedScene(
+            episode,
+            scene,
+            replace(pipeline, noise=condition.sensor_noise()),
+            lifter=lifter,
+            max_attempts=setting.attempts,
+            made_s=time.perf_counter() - start,
+        )
+        return self._shared
+
+    def _leave(self) -> None:
+        """Free the last scene and its renderer."""
+        self._open.close()
+        self._shared = None
 
     def _make_scene(self, episode: Episode) -> Scene:
         setting = self._setting
@@ -90,26 +147,26 @@ class Worker:
             return replace(scene, goal=replace(scene.goal, text=text))
         return scene
 
-    def _act(self, episode: Episode, scene: Scene, attempts: list[Attempt]) -> None:
-        setting, condition = self._setting, read_condition(episode.condition)
-        if self._generator is None:
-            self._generator = load_generator(setting.generator)
-        with assembled(
+    def _act(
+        self,
+        episode: Episode,
+        scene: Scene,
+        pipeline: Pipeline,
+        beginning: Beginning,
+        attempts: list[Attempt],
+    ) -> None:
+        """Append the episode's attempts as they end."""
+        setting = self._setting
+        for attempt in run_episode(
             scene,
-            lifter=self._lifter(scene.workspace, setting.encoder_for(episode.policy)),
-            policy=self._policy(episode.policy, scene, condition),
-            generator=self._generator,
-            planner=self._planner,
-            perturbation=condition.perturbation(),
-            keep_unreachable=setting.keep_unreachable,
-        ) as pipeline:
-            pipeline = replace(pipeline, noise=condition.sensor_noise())
-            for attempt in run_episode(
-                scene, pipeline, seed=episode.seed, max_attempts=setting.attempts
-            ):
-                attempts.append(attempt)
-            if setting.pictures is not None and episode.seed in setting.picture_seeds:
-                save_snapshots(scene, pipeline, attempts, setting.pictures / episode.key)
+            pipeline,
+            seed=episode.seed,
+            max_attempts=setting.attempts,
+            beginning=beginning,
+        ):
+            attempts.append(attempt)
+        if setting.pictures is not None and episode.seed in setting.picture_seeds:
+            save_snapshots(scene, pipeline, attempts, setting.pictures / episode.key)
 
     def _lifter(self, workspace: Workspace, encoder: str) -> MultiViewLifter:
         key = (workspace, encoder)
@@ -127,7 +184,8 @@ class Worker:
             )
         return self._encoders[name]
 
-    def _policy(self, label: str, scene: Scene, condition: Condition) -> Policy:
+    def _policy(self, episode: Episode, scene: Scene) -> Policy:
+        label, condition = episode.policy, read_condition(episode.condition)
         choice = self._setting.choice(label)
         if choice.name == OraclePolicy.name:
             return OraclePolicy(scene)

@@ -35,7 +35,7 @@ class _Process:
 
 def run_in_processes(
     make_work: Callable[[], Callable[[Task], Result]],
-    next_task: Callable[[], Task | None],
+    next_task: Callable[[Task | None], Task | None],
     give_up: Callable[[Task], Result],
     *,
     workers: int,
@@ -47,7 +47,8 @@ def run_in_processes(
     Args:
         make_work: Makes the function that does a piece; called once in every process, to which it
             is sent, so that it must be picklable.
-        next_task: Returns the next piece, or None; asked whenever a process is free.
+        next_task: Returns the next piece, or None, for a process that is free; it is given the last
+            piece that this process did, None if it has done none.
         give_up: Says what comes of a piece whose process has died `num_tries` times.
         workers: Number of processes.
         renew_after: Pieces after which a process is replaced, so that whatever libraries keep of
@@ -61,15 +62,15 @@ def run_in_processes(
     again: deque[Task] = deque()
     tries: Counter[Task] = Counter()
 
-    def following() -> Task | None:
-        task = again.popleft() if again else next_task()
+    def following(last: Task | None) -> Task | None:
+        task = again.popleft() if again else next_task(last)
         if task is not None:
             tries[task] += 1
         return task
 
     try:
         while True:
-            while len(active) < workers and (task := following()) is not None:
+            while len(active) < workers and (task := following(None)) is not None:
                 active.append(_start(make_work, task))
             if not active:
                 return
@@ -88,7 +89,7 @@ def run_in_processes(
                 # Before the next piece is chosen, whoever chooses has to know of this one.
                 yield result
                 is_old = renew_after is not None and item.num_begun >= renew_after
-                if is_old or (task := following()) is None:
+                if is_old or (task := following(item.task)) is None:
                     active.remove(item)
                     _end(item)
                 else:

@@ -29,7 +29,7 @@ class _Actor:
 
 def run_on_ray(
     make_work: Callable[[], Callable[[Task], Result]],
-    next_task: Callable[[], Task | None],
+    next_task: Callable[[Task | None], Task | None],
     give_up: Callable[[Task], Result],
     *,
     workers: int | None,
@@ -41,7 +41,8 @@ def run_on_ray(
 
     Args:
         make_work: Makes the function that does a piece; called once in every actor.
-        next_task: Returns the next piece, or None; asked whenever an actor is free.
+        next_task: Returns the next piece, or None, for an actor that is free; it is given the last
+            piece that this actor did, None if it has done none.
         give_up: Says what comes of a piece whose actor, or the actor's machine, has died
             `num_tries` times.
         workers: Number of actors; as many as the cluster has processors when None.
@@ -61,19 +62,21 @@ def run_on_ray(
     actor = ray.remote(num_cpus=1)(_Actor)
     again: deque[Task] = deque()
     tries: Counter[Task] = Counter()
-    idle: deque[Any] = deque()
+    idle: deque[tuple[Any, Task]] = deque()
     active: dict[Any, tuple[Any, Task]] = {}
     num_begun: Counter[Any] = Counter()
     try:
         while True:
             while len(active) < workers:
-                task = again.popleft() if again else next_task()
+                free, last = idle[0] if idle else (None, None)
+                task = again.popleft() if again else next_task(last)
                 if task is None:
                     break
                 tries[task] += 1
-                if not idle:
-                    idle.append(actor.remote(make_work))
-                free = idle.popleft()
+                if free is None:
+                    free = actor.remote(make_work)
+                else:
+                    idle.popleft()
                 num_begun[free] += 1
                 active[free.do.remote(task)] = (free, task)
             if not active:
@@ -95,7 +98,7 @@ def run_on_ray(
             if renew_after is not None and num_begun[free] >= renew_after:
                 ray.kill(free)
             else:
-                idle.append(free)
+                idle.append((free, task))
             yield result
     finally:
         ray.shutdown()

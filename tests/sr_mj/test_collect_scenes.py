@@ -8,12 +8,12 @@ from models.arrangements.library import arrangement_names, load_arrangement
 from models.objects.catalogue import object_names
 from policy.demonstrations import DemonstrationFolder
 from sr_mj.collecting.folder import open_folder, read_stock, save
-from sr_mj.collecting.states import SceneState
 from sr_mj.collecting.tasks import SceneTask
 from sr_mj.collecting.work import Limits, WorkSetting
 from sr_mj.collecting.worker import make_worker
 from sr_mj.execution import Executor
 from sr_mj.scene import SceneConfig, find_targets, make_scene
+from sr_mj.scene.state import SceneState
 
 pytestmark = [pytest.mark.render, pytest.mark.slow]
 

@@ -30,7 +30,7 @@ EXIT = partial(pydoc.locate, "os._exit")
 
 def handing_out(tasks):
     waiting = iter(tasks)
-    return lambda: next(waiting, None)
+    return lambda last: next(waiting, None)
 
 
 def given_up(task):
@@ -55,14 +55,16 @@ def test_processes_find_one_thread_in_their_environment():
 
 
 def test_the_next_piece_is_chosen_after_the_last_is_known():
-    known = []
+    known, before = [], []
 
-    def next_task():
+    def next_task(last):
+        before.append(last)
         return len(known) + 1 if len(known) < 3 else None
 
     for result in run_in_processes(FACTORIAL, next_task, given_up, workers=1):
         known.append(result)
     assert known == [1, 2, 6]
+    assert before == [None, 1, 2, 3, None]
 
 
 def test_a_piece_that_kills_its_process_is_given_up_and_the_others_go_on():

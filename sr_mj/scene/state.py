@@ -2,7 +2,7 @@
 
 import mujoco
 
-from sr_mj.scene import Scene
+from sr_mj.scene.build import Scene
 
 
 class SceneState:
