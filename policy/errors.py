@@ -29,6 +29,10 @@ class NoCandidatesError(PolicyError, ValueError):
     """The best of zero candidates was asked for."""
 
 
+class MissingImagesError(PolicyError, ValueError):
+    """A policy looks at pictures, and the observation has none."""
+
+
 class MissingCheckpointError(PolicyError, FileNotFoundError):
     """A policy needs weights that are not there."""
 

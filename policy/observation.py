@@ -8,6 +8,8 @@ import numpy as np
 from policy.actions import ACTION_KINDS, ActionKind
 from policy.arrays import check_range, checked_array
 from policy.errors import InvalidArrayError
+from policy.images import ImageSource
+from policy.objects import SceneObjects
 
 PlaceSide = Literal["inside", "outside"]
 """Where to put something down: in or on a reference, or around it."""
@@ -37,6 +39,10 @@ class Observation:
         relation: Word for the place relative to the reference, such as "near"; None in the pick
             phase, or where the instruction names none.
         side: What the relation asks for: a place in or on the reference, or one around it.
+        images: Describes the pictures themselves to the few policies that ask; None where there
+            are none, as in demonstrations.
+        objects: Segments of the cloud, if they were found already; a policy that needs them finds
+            them otherwise.
 
     Raises:
         InvalidArrayError: If a field has a wrong shape or value, or the fields don't fit.
@@ -54,6 +60,8 @@ class Observation:
     phrase_pooled: np.ndarray | None = None
     relation: str | None = None
     side: PlaceSide | None = None
+    images: ImageSource | None = None
+    objects: SceneObjects | None = None
 
     def __post_init__(self) -> None:
         """Check the fields and replace the arrays by read-only copies."""

@@ -20,10 +20,15 @@ _WITHOUT_WEIGHTS = {
     "lerf-togo": "policy.baselines.lerf_togo.LerfTogoPolicy",
     "think-grasp": "policy.baselines.think_grasp.ThinkGraspPolicy",
     "vlp": "policy.baselines.vlp.VlpPolicy",
+    "raw-image": "policy.baselines.raw_image.RawImagePolicy",
+    "raw-image-grid": "policy.baselines.raw_image.RawImageGridPolicy",
 }
 _LEARNT = {
+    "a2": "policy.baselines.a2.A2Policy",
+    "vlg": "policy.baselines.vlg.VLGPolicy",
     "base": "policy.baselines.ablations.BasePolicy",
     "sr-a": "policy.baselines.ablations.SRAPolicy",
+    "sr": "policy.sr.SRPolicy",
 }
 
 
@@ -51,16 +56,9 @@ def _learnt(name: str) -> _Loader:
     return load
 
 
-def _load_sr(checkpoint: Path | None, encoder: Fingerprints) -> Policy:
-    from policy.sr import DEFAULT_CHECKPOINT, SRPolicy
-
-    return SRPolicy.from_checkpoint(checkpoint or DEFAULT_CHECKPOINT, encoder=encoder)
-
-
 _LOADERS: dict[str, _Loader] = {
     **{name: _without_weights(name) for name in _WITHOUT_WEIGHTS},
     **{name: _learnt(name) for name in _LEARNT},
-    "sr": _load_sr,
 }
 
 POLICY_NAMES: tuple[str, ...] = tuple(_LOADERS)

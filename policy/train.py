@@ -1,6 +1,7 @@
-"""Train the SR network on demonstrations.
+"""Train a network on demonstrations: SR, its ablations, or a baseline.
 
     python -m policy.train --data DIR --out RUN
+    python -m policy.train --data DIR --out RUN --variant a2
     python -m policy.train --data DIR --out RUN --resume
     torchrun --nproc-per-node 2 -m policy.train --data DIR --out RUN
     python -m policy.train plot RUN RUN --out curves.png

@@ -7,6 +7,7 @@ import numpy as np
 from perception.lifter import MultiViewLifter, Percept
 from perception.views import CameraView
 from policy.base import Policy
+from policy.images import ImageSource
 from policy.observation import Observation
 from sr_mj.candidates.generator import CandidateGenerator, PlaceGenerator
 from sr_mj.execution import Executor
@@ -92,13 +93,16 @@ def look(scene: Scene, pipeline: Pipeline, rng: np.random.Generator) -> tuple[Ca
     return hide_robot(views, pipeline.robot, pipeline.executor.drive.arm_qpos, scene.workspace)
 
 
-def observe(percept: Percept, scene: Scene, text: PhaseText) -> Observation:
+def observe(
+    percept: Percept, scene: Scene, text: PhaseText, images: ImageSource | None = None
+) -> Observation:
     """Reduce a percept to what a policy may see: arrays of the cloud and the instruction.
 
     Args:
         percept: What was perceived with respect to `text`.
         scene: For its workspace; nothing else is read.
         text: What the instruction says about this phase.
+        images: The pictures that were perceived; described only if the policy asks for them.
 
     Returns:
         The observation.
@@ -117,4 +121,5 @@ def observe(percept: Percept, scene: Scene, text: PhaseText) -> Observation:
         phase=text.phase,
         relation=text.relation,
         side=text.side,
+        images=images,
     )

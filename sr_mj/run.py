@@ -52,8 +52,8 @@ class RunConfig:
     templates by default."""
     policy: str = "grounding"
     """How a grasp or place is chosen: grounding; the baselines random, clip-grounding, lerf-togo,
-    think-grasp, vlp; sr, base, sr-a (need trained weights); or oracle, which reads ground truth and
-    marks the ceiling."""
+    think-grasp, vlp, raw-image, raw-image-grid; the trained sr, base, sr-a, a2, vlg; or oracle,
+    which reads ground truth and marks the ceiling."""
     generator: str = "antipodal"
     """Where grasps come from: antipodal (our sampler), or a learnt generator's file:PATH or
     http://HOST:PORT/PATH (docs/generators.md)."""

@@ -1,13 +1,12 @@
 """The paper's ablations of the SR network (table 3), under names of their own."""
 
-from collections.abc import Collection
 from pathlib import Path
 from typing import ClassVar
 
-from policy.errors import InvalidCheckpointError, MissingCheckpointError
-from policy.network.checkpoint import load_checkpoint
+from policy.errors import InvalidCheckpointError
 from policy.network.config import Ablation, ablation_switches
-from policy.sr import DEFAULT_CHECKPOINT, SRPolicy
+from policy.network.model import SRNetwork
+from policy.sr import SRPolicy
 
 
 class _AblatedPolicy(SRPolicy):
@@ -16,33 +15,16 @@ class _AblatedPolicy(SRPolicy):
     variant: ClassVar[Ablation]
 
     @classmethod
-    def from_checkpoint(
-        cls, path: Path | None = None, *, encoder: str | Collection[str] | None = None
-    ) -> SRPolicy:
-        """Load trained weights of this variant.
+    def check_network(cls, network: SRNetwork, path: Path) -> None:
+        """Refuse a network with other parts.
 
         Args:
-            path: File of the weights, with its card beside it; None for those shipped.
-            encoder: Fingerprint of the encoder whose features it will get, or several that stand
-                for it; None to take any.
-
-        Returns:
-            The policy.
+            network: What was loaded.
+            path: From where.
 
         Raises:
-            MissingCheckpointError: If the weights or their card are missing.
-            InvalidCheckpointError: If they can't be read, were trained on another encoder's
-                features, or are those of another variant.
+            InvalidCheckpointError: If it is another variant.
         """
-        path = path or DEFAULT_CHECKPOINT.with_stem(cls.variant)
-        missing = [str(p) for p in (path, path.with_suffix(".json")) if not p.is_file()]
-        if missing:
-            raise MissingCheckpointError(
-                f"No weights for the policy {cls.name!r}: missing {' and '.join(missing)}. Train "
-                f"them with python -m policy.train --variant {cls.variant} and pass "
-                "checkpoint=FILE.safetensors, or use the policy 'grounding', which needs none."
-            )
-        network = load_checkpoint(path, encoder=encoder)
         for switch in ("one_align", "dssa"):
             expected = ablation_switches(cls.variant)[switch]
             if getattr(network.config, switch) is not expected:
@@ -51,7 +33,6 @@ class _AblatedPolicy(SRPolicy):
                     f"the policy {cls.name!r}. Choose weights trained with --variant "
                     f"{cls.variant}, or the policy that these belong to."
                 )
-        return cls(network)
 
 
 class BasePolicy(_AblatedPolicy):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -10,9 +11,13 @@ from torch import Tensor
 
 from policy.actions import ActionCandidates
 from policy.arrays import check_range, checked_array
+from policy.baselines.objects import find_objects
 from policy.errors import InvalidArrayError
-from policy.network.config import SRConfig
+from policy.network.config import NetworkConfig
+from policy.network.objects import ObjectBatch, collate_objects
+from policy.network.padding import pad
 from policy.network.selection import select_points
+from policy.objects import SceneObjects
 from policy.observation import Observation
 
 PHASES = ("pick", "place", "place inside", "place outside")
@@ -33,6 +38,7 @@ class SRSample:
         poses: (K, 7) float32 candidates: normalised position, quaternion x, y, z, w.
         prior: (K,) float32 geometric quality, 0 (bad) to 1 (good).
         phase: Index into `PHASES`.
+        objects: Segments of the cloud, normalised, for a network that looks at them.
 
     Raises:
         InvalidArrayError: If a field has a wrong shape or value, or the fields don't fit.
@@ -47,6 +53,7 @@ class SRSample:
     poses: np.ndarray
     prior: np.ndarray
     phase: int
+    objects: SceneObjects | None = None
 
     def __post_init__(self) -> None:
         """Check the fields and replace the arrays by read-only copies."""
@@ -65,6 +72,11 @@ class SRSample:
             array = checked_array(name, getattr(self, name), shape, sizes=sizes)
             object.__setattr__(self, name, array)
         check_range("prior", self.prior, 0.0, 1.0)
+        if self.objects is not None and self.objects.features.shape[1] != sizes["C"]:
+            raise InvalidArrayError(
+                f"objects: got features of {self.objects.features.shape[1]} channels, expected "
+                f"{sizes['C']} as in features."
+            )
         if self.phase not in range(len(PHASES)):
             names = ", ".join(f"{i} ({name})" for i, name in enumerate(PHASES))
             raise InvalidArrayError(f"phase: got {self.phase!r}, expected one of {names}.")
@@ -87,6 +99,7 @@ class SRBatch:
         prior: (B, K) geometric quality of the candidates.
         candidate_mask: (B, K) True for real candidates.
         phase: (B,) int64, index into `PHASES`.
+        objects: Segments of the clouds, for a network that looks at them; else None.
     """
 
     positions: Tensor
@@ -101,10 +114,15 @@ class SRBatch:
     prior: Tensor
     candidate_mask: Tensor
     phase: Tensor
+    objects: ObjectBatch | None = None
 
     def to(self, device: torch.device | str) -> "SRBatch":
         """Copy every tensor to a device."""
-        return SRBatch(**{f.name: getattr(self, f.name).to(device) for f in fields(self)})
+        copies: dict[str, Any] = {}
+        for f in fields(self):
+            value = getattr(self, f.name)
+            copies[f.name] = None if value is None else value.to(device)
+        return SRBatch(**copies)
 
     def take_points(self, order: Int[Tensor, "batch points"]) -> "SRBatch":
         """Reorder the points of every decision.
@@ -128,7 +146,7 @@ class SRBatch:
 def make_sample(
     observation: Observation,
     candidates: ActionCandidates,
-    config: SRConfig,
+    config: NetworkConfig,
     *,
     chosen: Int[np.ndarray, " M"] | None = None,
 ) -> SRSample:
@@ -137,7 +155,7 @@ def make_sample(
     Args:
         observation: The scene's feature cloud and the instruction.
         candidates: K candidates.
-        config: Limits the points and says which to take.
+        config: Limits the points, says which to take and whether objects are looked at.
         chosen: Indices of the points to take instead, such as those of an earlier call of
             `choose_points`.
 
@@ -158,6 +176,12 @@ def make_sample(
     half = (observation.workspace_max - observation.workspace_min) / 2
     phrase = observation.phrase_pooled
     side = observation.side if candidates.kind == "place" else None
+    objects = None
+    if config.uses_objects:
+        objects = observation.objects
+        if objects is None:
+            objects = find_objects(observation.points, observation.features, observation.similarity)
+        objects = objects.normalised(center, half)
     poses = candidates.as_pose7()
     poses[:, :3] = (candidates.positions - center) / half
     return SRSample(
@@ -170,10 +194,11 @@ def make_sample(
         poses=poses,
         prior=candidates.prior,
         phase=PHASES.index(" ".join((candidates.kind, *filter(None, [side])))),
+        objects=objects,
     )
 
 
-def choose_points(observation: Observation, config: SRConfig) -> Int[np.ndarray, " M"]:
+def choose_points(observation: Observation, config: NetworkConfig) -> Int[np.ndarray, " M"]:
     """Choose the points of a cloud that the network gets to see.
 
     Args:
@@ -224,24 +249,5 @@ def collate(samples: Sequence[SRSample]) -> SRBatch:
         prior=pad([sample.prior for sample in samples])[0],
         candidate_mask=candidate_mask,
         phase=torch.tensor([sample.phase for sample in samples]),
+        objects=collate_objects([sample.objects for sample in samples]),
     )
-
-
-def pad(rows: Sequence[np.ndarray]) -> tuple[Tensor, Tensor]:
-    """Stack arrays of different lengths.
-
-    Args:
-        rows: B arrays that agree in all but their first size.
-
-    Returns:
-        (B, L, ...) float32 (or bool) values, zero beyond each array's end, with L at least 1;
-        and the (B, L) mask of real entries.
-    """
-    length = max(1, *(len(row) for row in rows))
-    dtype = np.bool_ if rows[0].dtype == np.bool_ else np.float32
-    values = np.zeros((len(rows), length, *rows[0].shape[1:]), dtype=dtype)
-    mask = np.zeros((len(rows), length), dtype=np.bool_)
-    for i, row in enumerate(rows):
-        values[i, : len(row)] = row
-        mask[i, : len(row)] = True
-    return torch.from_numpy(values), torch.from_numpy(mask)

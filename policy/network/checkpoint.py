@@ -1,26 +1,30 @@
-"""Weights of the network on disk: safetensors, and a JSON card that says what they are."""
+"""Weights of a network on disk: safetensors, and a JSON card that says what they are."""
 
 import json
 import os
 from collections.abc import Callable, Collection
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
 from policy.errors import InvalidCheckpointError, InvalidConfigError, MissingCheckpointError
-from policy.network.config import SRConfig
-from policy.network.model import SRNetwork
+from policy.network.base import CandidateNetwork
+from policy.network.config import NetworkConfig
 
 _FORMAT = 1
+# What a card without a kind describes.
+_FIRST_KIND = "sr"
+
+Network = TypeVar("Network", bound=CandidateNetwork)
 
 
 def save_checkpoint(
     path: Path,
-    network: SRNetwork,
+    network: CandidateNetwork,
     training: dict[str, Any],
     *,
     encoder: str | None = None,
@@ -45,6 +49,7 @@ def save_checkpoint(
     }
     card = {
         "format": _FORMAT,
+        "kind": network.config.kind,
         "config": asdict(network.config),
         "encoder": encoder,
         "training": training,
@@ -54,11 +59,14 @@ def save_checkpoint(
     _replace(path.with_suffix(".json"), lambda part: part.write_text(text))
 
 
-def load_checkpoint(path: Path, *, encoder: str | Collection[str] | None = None) -> SRNetwork:
+def load_checkpoint(
+    path: Path, network_type: type[Network], *, encoder: str | Collection[str] | None = None
+) -> Network:
     """Read weights and card.
 
     Args:
         path: File of the weights; the card must lie beside it with the suffix .json.
+        network_type: What network they must be of.
         encoder: Fingerprint of the encoder whose features the network will get, or several that
             stand for it, such as those of its precisions; None to take any.
 
@@ -67,17 +75,17 @@ def load_checkpoint(path: Path, *, encoder: str | Collection[str] | None = None)
 
     Raises:
         MissingCheckpointError: If either file is missing.
-        InvalidCheckpointError: If the card or the weights don't fit this version, or were trained
-            on another encoder's features.
+        InvalidCheckpointError: If the card or the weights don't fit this version, are of another
+            kind of network, or were trained on another encoder's features.
     """
     card_path = path.with_suffix(".json")
     missing = [str(p) for p in (path, card_path) if not p.is_file()]
     if missing:
         raise MissingCheckpointError(
-            f"No weights for the policy 'sr': missing {' and '.join(missing)}. Pass "
-            "checkpoint=FILE.safetensors, or use the policy 'grounding', which needs no weights."
+            f"Missing {' and '.join(missing)}; expected weights and their card side by side, as "
+            "python -m policy.train writes them."
         )
-    config, trained_on = _read_card(card_path)
+    config, trained_on = _read_card(card_path, network_type.config_type)
     accepted = (encoder,) if isinstance(encoder, str) else encoder
     if accepted is not None and trained_on is not None and trained_on not in accepted:
         raise InvalidCheckpointError(
@@ -85,7 +93,7 @@ def load_checkpoint(path: Path, *, encoder: str | Collection[str] | None = None)
             f"{' or '.join(accepted)}, which is in use. Choose the encoder that they were trained "
             "with, or train anew with python -m policy.train on demonstrations of this one."
         )
-    network = SRNetwork(config)
+    network = network_type(config)
     try:
         network.load_state_dict(load_file(path))
     except (SafetensorError, RuntimeError) as error:
@@ -108,7 +116,9 @@ def _replace(path: Path, write: Callable[[Path], object]) -> None:
         part.unlink(missing_ok=True)
 
 
-def _read_card(card_path: Path) -> tuple[SRConfig, str | None]:
+def _read_card(
+    card_path: Path, config_type: type[NetworkConfig]
+) -> tuple[NetworkConfig, str | None]:
     try:
         card = json.loads(card_path.read_text())
         if card["format"] != _FORMAT:
@@ -116,7 +126,14 @@ def _read_card(card_path: Path) -> tuple[SRConfig, str | None]:
                 f"{card_path}: got format {card['format']!r}, expected {_FORMAT}. "
                 "Save the weights again with this version."
             )
-        return SRConfig(**card["config"]), card.get("encoder")
+        kind = card.get("kind", _FIRST_KIND)
+        if kind != config_type.kind:
+            raise InvalidCheckpointError(
+                f"{card_path.with_suffix('.safetensors')}: got weights of a network of kind "
+                f"{kind!r}, expected {config_type.kind!r}. Choose others, or the policy that these "
+                "belong to."
+            )
+        return config_type(**card["config"]), card.get("encoder")
     except (json.JSONDecodeError, KeyError, TypeError, InvalidConfigError) as error:
         raise InvalidCheckpointError(
             f"{card_path}: got a card that can't be read ({type(error).__name__}: {error}), "

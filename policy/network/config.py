@@ -1,7 +1,7 @@
-"""Size and variants of the SR network."""
+"""Size and variants of the networks."""
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 from policy.errors import InvalidConfigError
 
@@ -13,13 +13,71 @@ Ablation = Literal["base", "sr_a", "sr"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class SRConfig:
-    """Architecture of the network; stored beside its weights.
+class NetworkConfig:
+    """What every network over decisions has; stored beside its weights.
 
     Attributes:
+        kind: Kind of network, as `policy.network.kinds` knows it.
+        uses_objects: Whether a sample holds the segments of the cloud beside its points.
         feature_dim: Channels C of the visual and text features.
         width: Width D of the network; 512 as in section 3.3.1 (A2 uses 768).
         num_heads: Attention heads.
+        max_points: Points taken from a cloud of 1500-3000; attention is quadratic in them.
+        point_selection: "balanced": half by similarity, half spread evenly. "similar": the most
+            similar ones only, as A2 does.
+        max_opening_m: Largest finger opening that can be read out, metres.
+        max_refinement_rad: Largest correction of the orientation that can be read out: the
+            candidate was checked for collisions as it stands, so only a small one is safe.
+
+    Raises:
+        InvalidConfigError: If a value is out of range or contradicts another one.
+    """
+
+    kind: ClassVar[str]
+    uses_objects: ClassVar[bool] = False
+
+    feature_dim: int
+    width: int = 512
+    num_heads: int = 8
+    max_points: int = 512
+    point_selection: PointSelection = "balanced"
+    max_opening_m: float = 0.085
+    max_refinement_rad: float = 0.2
+
+    def __post_init__(self) -> None:
+        """Check ranges and combinations."""
+        self._check_positive(
+            "feature_dim", "width", "num_heads", "max_points", "max_opening_m", "max_refinement_rad"
+        )
+        self._check_choice("point_selection", PointSelection)
+        if self.width % self.num_heads:
+            raise InvalidConfigError(
+                f"width: got {self.width}, expected a multiple of num_heads={self.num_heads}."
+            )
+
+    @property
+    def head_dim(self) -> int:
+        """Channels d of one head."""
+        return self.width // self.num_heads
+
+    def _check_positive(self, *names: str) -> None:
+        for name in names:
+            if getattr(self, name) <= 0:
+                raise InvalidConfigError(f"{name}: got {getattr(self, name)}, expected above 0.")
+
+    def _check_choice(self, name: str, choices: Any) -> None:
+        if getattr(self, name) not in get_args(choices):
+            raise InvalidConfigError(
+                f"{name}: got {getattr(self, name)!r}, expected one of "
+                f"{', '.join(get_args(choices))}."
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SRConfig(NetworkConfig):
+    """Architecture of the SR network.
+
+    Attributes:
         prior: Add the candidate generator's prior to the logit, times a learnt weight. Departure:
             a pose alone does not tell whether the fingers meet the surface squarely or have room;
             the generator measured both.
@@ -54,20 +112,13 @@ class SRConfig:
         num_fourier_bands: Octaves of the Fourier features. Six give a shortest wavelength of
             1/16 of the workspace's width, 28 mm in the standard one: about a finger's width.
         num_bias_scales: Scales of both relative position biases.
-        max_points: Points taken from a cloud of 1500-3000; attention is quadratic in them.
-        point_selection: "balanced": half by similarity, half spread evenly. "similar": the most
-            similar ones only, as A2 does.
-        max_opening_m: Largest finger opening that can be read out, metres.
-        max_refinement_rad: Largest correction of the orientation that can be read out: the
-            candidate was checked for collisions as it stands, so only a small one is safe.
 
     Raises:
         InvalidConfigError: If a value is out of range or contradicts another one.
     """
 
-    feature_dim: int
-    width: int = 512
-    num_heads: int = 8
+    kind: ClassVar[str] = "sr"
+
     prior: bool = True
     phrase: bool = True
     side: bool = True
@@ -84,54 +135,23 @@ class SRConfig:
     query_fourier: bool = True
     num_fourier_bands: int = 6
     num_bias_scales: int = 6
-    max_points: int = 512
-    point_selection: PointSelection = "balanced"
-    max_opening_m: float = 0.085
-    max_refinement_rad: float = 0.2
 
     def __post_init__(self) -> None:
         """Check ranges and combinations."""
-        for name in (
-            "feature_dim",
-            "width",
-            "num_heads",
-            "num_dssa_layers",
-            "num_fourier_bands",
-            "num_bias_scales",
-            "max_points",
-            "max_opening_m",
-            "max_refinement_rad",
-        ):
-            if getattr(self, name) <= 0:
-                raise InvalidConfigError(f"{name}: got {getattr(self, name)}, expected above 0.")
+        super().__post_init__()
+        self._check_positive("num_dssa_layers", "num_fourier_bands", "num_bias_scales")
         if self.num_encoder_layers < 0:
             raise InvalidConfigError(
                 f"num_encoder_layers: got {self.num_encoder_layers}, expected at least 0."
             )
-        if self.width % self.num_heads:
-            raise InvalidConfigError(
-                f"width: got {self.width}, expected a multiple of num_heads={self.num_heads}."
-            )
-        for name, choices in (
-            ("sparsifier", get_args(Sparsifier)),
-            ("self_attention", get_args(SelfAttention)),
-            ("point_selection", get_args(PointSelection)),
-            ("language_attention", get_args(LanguageAttention)),
-        ):
-            if getattr(self, name) not in choices:
-                raise InvalidConfigError(
-                    f"{name}: got {getattr(self, name)!r}, expected one of {', '.join(choices)}."
-                )
+        self._check_choice("sparsifier", Sparsifier)
+        self._check_choice("self_attention", SelfAttention)
+        self._check_choice("language_attention", LanguageAttention)
         if self.dssa and not self.one_align:
             raise InvalidConfigError(
                 "dssa: got True with one_align=False, expected dssa=False: DSSA refines what "
                 "stage 1 puts out."
             )
-
-    @property
-    def head_dim(self) -> int:
-        """Channels d of one head."""
-        return self.width // self.num_heads
 
 
 def ablation_switches(name: Ablation) -> dict[str, bool]:

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from torch.nn.functional import softplus
 
 from policy.network.batch import PHASES
-from policy.network.config import SRConfig
+from policy.network.config import NetworkConfig, SRConfig
 from policy.network.encoding import mlp
 
 # Size of the learnt query at the start: small enough for the prior and the semantic mask to decide
@@ -93,7 +93,7 @@ class CandidateEvidence(nn.Module):
 class ActionDecoder(nn.Module):
     """Inner product with a learnt query for the score, a three-layer MLP for the rest."""
 
-    def __init__(self, config: SRConfig) -> None:
+    def __init__(self, config: NetworkConfig) -> None:
         """Make the heads.
 
         Args:

@@ -11,9 +11,9 @@ from torch.nn import functional
 
 from policy.arrays import check_range, checked_array
 from policy.errors import InvalidArrayError
-from policy.network.batch import pad
-from policy.network.config import SRConfig
+from policy.network.config import NetworkConfig
 from policy.network.decoder import SROutput
+from policy.network.padding import pad
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +130,9 @@ def choice_loss(
     return (logits.logsumexp(dim=1) - chosen).mean()
 
 
-def decoding_loss(output: SROutput, targets: SRTargetBatch, config: SRConfig) -> Float[Tensor, ""]:
+def decoding_loss(
+    output: SROutput, targets: SRTargetBatch, config: NetworkConfig
+) -> Float[Tensor, ""]:
     """Loss of the action parameters on the positive candidates.
 
     The paper trains on eq. (15) alone, which leaves the outputs of section 3.4.2 without a
@@ -155,7 +157,7 @@ def decoding_loss(output: SROutput, targets: SRTargetBatch, config: SRConfig) ->
 
 
 def sr_loss(
-    output: SROutput, targets: SRTargetBatch, config: SRConfig, *, decoding_weight: float = 0.1
+    output: SROutput, targets: SRTargetBatch, config: NetworkConfig, *, decoding_weight: float = 0.1
 ) -> Float[Tensor, ""]:
     """The training objective.
 

@@ -1,6 +1,7 @@
 """The SR network: from a padded batch of decisions to scores of the candidates."""
 
 from dataclasses import replace
+from typing import ClassVar
 
 import torch
 from jaxtyping import Bool, Float
@@ -12,6 +13,7 @@ from policy.network.alignment import (
     PointwiseLanguageAttention,
     scaled_similarity,
 )
+from policy.network.base import CandidateNetwork
 from policy.network.batch import SRBatch
 from policy.network.bias import position_basis
 from policy.network.config import SRConfig
@@ -22,13 +24,16 @@ from policy.network.encoding import fourier_features, num_fourier_features
 from policy.network.morton import morton_order
 
 
-class SRNetwork(nn.Module):
+class SRNetwork(CandidateNetwork):
     """Two-stage cross-modal alignment with dense-sparse self-attention (section 3.3).
 
     Stage 1 gates the cloud by the instruction, DSSA lets the points exchange information, stage 2
     lets every candidate gather from the points, and the decoder scores the candidates. Scores do
     not depend on the order of the points, nor on padding, and follow the order of the candidates.
     """
+
+    config_type: ClassVar[type[SRConfig]] = SRConfig
+    config: SRConfig
 
     def __init__(self, config: SRConfig) -> None:
         """Make a network with random weights.
@@ -92,6 +97,12 @@ class SRNetwork(nn.Module):
             return self.language_alignment.gate(batch)
         relevance = _relevance(batch.similarity, batch.point_mask)
         return relevance[:, None].expand(-1, self.config.num_heads, -1)
+
+    @property
+    def masking(self) -> nn.Module | None:
+        """Stage 1, if it makes a mask."""
+        stage = self.language_alignment
+        return stage if isinstance(stage, LanguageAlignment) else None
 
     def alpha(self) -> Float[Tensor, "layers 2"]:
         """Weights of the sparse and the dense branch of every DSSA layer (eq. 12)."""

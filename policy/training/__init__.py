@@ -1,1 +1,1 @@
-"""Training of the SR network from demonstrations; `python -m policy.train` is its command line."""
+"""Training of networks from demonstrations; `python -m policy.train` is its command line."""

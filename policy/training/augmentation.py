@@ -48,6 +48,7 @@ def augment(
         text_tokens=observation.text_tokens * gain,
         text_pooled=observation.text_pooled * gain,
         phrase_pooled=None if phrase is None else phrase * gain,
+        objects=None if observation.objects is None else observation.objects.moved(T, gain),
     )
     noise = rng.normal(scale=config.prior_noise, size=len(candidates))
     moved = replace(

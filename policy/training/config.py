@@ -9,8 +9,10 @@ from typing import Annotated, Any, Literal, get_args
 import tyro
 
 from policy.errors import InvalidConfigError
-from policy.network.config import Ablation, SRConfig, ablation_switches
+from policy.network.config import NetworkConfig, ablation_switches
+from policy.network.kinds import network_type
 
+Variant = Literal["sr", "sr_a", "base", "a2", "vlg"]
 Schedule = Literal["constant", "cosine"]
 PickPositives = Literal["closest", "target"]
 Precision = Literal["auto", "float32", "bfloat16"]
@@ -68,8 +70,9 @@ class TrainConfig:
     """Folder of demonstrations, made by `python -m sr_mj.collect`."""
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
     """Folder of the run: best.safetensors with its card, logs, and the state to resume from."""
-    variant: Ablation = "sr"
-    """sr (both stages and DSSA), sr_a (without DSSA) or base (stage 2 only)."""
+    variant: Variant = "sr"
+    """sr (both stages and DSSA), sr_a (without DSSA) or base (stage 2 only); or another network on
+    the same data: a2 (one stage, features times similarity) or vlg (objects instead of points)."""
     seed: int = 0
     """Draws weights, order and augmentation. The split does not depend on it."""
     epochs: int = 200
@@ -106,9 +109,9 @@ class TrainConfig:
     train_share: float = 1.0
     """Share of the training scenes to use, to see what more data would bring."""
     width: int | None = None
-    """Width of the network; that of SRConfig by default."""
+    """Width of the network; that of its configuration by default."""
     points: int | None = None
-    """Points the network takes from a cloud; that of SRConfig by default."""
+    """Points the network takes from a cloud; that of its configuration by default."""
     network: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Other settings of the network, such as num_dssa_layers=1 sparsifier=softmax."""
     augmentation: AugmentationConfig = field(default_factory=AugmentationConfig)
@@ -149,7 +152,7 @@ class TrainConfig:
         _check("train_share", self.train_share, 0 < self.train_share <= 1, "above 0, at most 1")
         _check("device", self.device, self.device in ("cpu", "cuda"), "cpu or cuda")
 
-    def network_config(self, feature_dim: int) -> SRConfig:
+    def network_config(self, feature_dim: int) -> NetworkConfig:
         """Say what network is trained.
 
         Args:
@@ -161,19 +164,24 @@ class TrainConfig:
         Raises:
             InvalidConfigError: If a setting does not exist or does not fit.
         """
-        settings: dict[str, Any] = dict(ablation_switches(self.variant))
-        settings |= dict(_parse_setting(text) for text in self.network)
+        settings: dict[str, Any] = {}
+        if self.variant == "a2" or self.variant == "vlg":
+            config_type = network_type(self.variant).config_type
+        else:
+            config_type = network_type("sr").config_type
+            settings |= ablation_switches(self.variant)
+        settings |= dict(_parse_setting(text, config_type) for text in self.network)
         for name, value in (("width", self.width), ("max_points", self.points)):
             if value is not None:
                 settings[name] = value
-        return SRConfig(feature_dim=feature_dim, **settings)
+        return config_type(feature_dim=feature_dim, **settings)
 
 
-def _parse_setting(text: str) -> tuple[str, Any]:
-    """Read one NAME=VALUE as the field of `SRConfig` wants it."""
-    types = typing.get_type_hints(SRConfig)
+def _parse_setting(text: str, config_type: type[NetworkConfig]) -> tuple[str, Any]:
+    """Read one NAME=VALUE as the field of the configuration wants it."""
+    types = typing.get_type_hints(config_type)
     name, equals, value = text.partition("=")
-    names = [f.name for f in dataclasses.fields(SRConfig) if f.name != "feature_dim"]
+    names = [f.name for f in dataclasses.fields(config_type) if f.name != "feature_dim"]
     if not equals or name not in names:
         raise InvalidConfigError(
             f"network: got {text!r}, expected NAME=VALUE with one of {', '.join(names)}."

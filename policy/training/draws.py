@@ -8,8 +8,9 @@ import numpy as np
 from torch import Tensor
 
 from policy.demonstrations import Decision
-from policy.network.batch import SRBatch, SRSample, collate, make_sample, pad
+from policy.network.batch import SRBatch, SRSample, collate, make_sample
 from policy.network.loss import SRTarget, SRTargetBatch, collate_targets
+from policy.network.padding import pad
 from policy.training.augmentation import augment
 from policy.training.config import PickPositives, TrainConfig
 from policy.training.store import DecisionStore

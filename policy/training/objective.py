@@ -5,9 +5,9 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
+from policy.network.base import CandidateNetwork
 from policy.network.decoder import SROutput
 from policy.network.loss import choice_loss, decoding_loss
-from policy.network.model import SRNetwork
 from policy.training.config import Precision
 from policy.training.draws import ExampleBatch
 
@@ -33,7 +33,9 @@ class Terms(NamedTuple):
 class Objective(nn.Module):
     """Scores a batch and compares it with its targets; one forward pass, as DDP wants it."""
 
-    def __init__(self, network: SRNetwork, decoding_weight: float, dtype: torch.dtype) -> None:
+    def __init__(
+        self, network: CandidateNetwork, decoding_weight: float, dtype: torch.dtype
+    ) -> None:
         """Wrap a network.
 
         Args:

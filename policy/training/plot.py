@@ -8,7 +8,7 @@ from typing import Any
 from policy.errors import InvalidConfigError
 from policy.training.logs import EPOCHS_FILE, read_table
 
-_VARIANTS = {"sr": "SR", "sr_a": "SR-A", "base": "BASE"}
+_VARIANTS = {"sr": "SR", "sr_a": "SR-A", "base": "BASE", "a2": "A²", "vlg": "VLG"}
 
 
 def draw_curves(runs: Sequence[Path], out: Path) -> None:

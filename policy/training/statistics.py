@@ -7,11 +7,10 @@ from contextlib import contextmanager
 import torch
 from torch import Tensor, nn
 
-from policy.network.alignment import LanguageAlignment
-from policy.network.model import SRNetwork
+from policy.network.base import CandidateNetwork
 
 
-def gradient_norms(network: SRNetwork) -> dict[str, float]:
+def gradient_norms(network: CandidateNetwork) -> dict[str, float]:
     """Norm of the gradient of every part of the network.
 
     Args:
@@ -28,11 +27,11 @@ def gradient_norms(network: SRNetwork) -> dict[str, float]:
     return norms
 
 
-def branch_weights(network: SRNetwork) -> dict[str, float]:
+def branch_weights(network: CandidateNetwork) -> dict[str, float]:
     """Weight of the sparse branch in every DSSA layer; the dense one has the rest.
 
     Args:
-        network: The network.
+        network: The network, of any kind.
 
     Returns:
         `alpha_sparse_LAYER`, layers counted from 0.
@@ -63,18 +62,18 @@ class GateEntropy:
 
 
 @contextmanager
-def gate_entropy(network: SRNetwork) -> Iterator[GateEntropy]:
-    """Watch the semantic mask of stage 1.
+def gate_entropy(network: CandidateNetwork) -> Iterator[GateEntropy]:
+    """Watch the semantic mask of stage 1, in networks that have one.
 
     Args:
-        network: The network, of any variant.
+        network: The network, of any kind.
 
     Yields:
         The entropy, renewed by every forward pass.
     """
     entropy = GateEntropy()
-    stage = network.language_alignment
-    if not isinstance(stage, LanguageAlignment):
+    stage = network.masking
+    if stage is None:
         yield entropy
         return
     handle = stage.register_forward_pre_hook(entropy)

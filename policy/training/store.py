@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from policy.actions import ActionCandidates
+from policy.baselines.objects import label_means, object_labels, pool_objects
 from policy.demonstrations import Decision, Demonstration, DemonstrationFolder, Look
-from policy.network.config import SRConfig
+from policy.network.config import NetworkConfig
 from policy.network.selection import select_points
+from policy.objects import SceneObjects
 from policy.observation import Observation
 
 # A wording's texts and similarities, a decision's candidates; measured on cluttered scenes.
@@ -41,10 +43,13 @@ class DecisionStore:
     """Hands out the decisions of a folder, with as many points as asked for.
 
     Choosing points costs 7 ms, more than all else, and depends on look and wording alone; the
-    choices are remembered. Looks are remembered if they fit into memory.
+    choices are remembered. So are the segments of a look, for a network that looks at objects.
+    Looks are remembered if they fit into memory.
     """
 
-    def __init__(self, folder: DemonstrationFolder, config: SRConfig, *, in_memory: bool) -> None:
+    def __init__(
+        self, folder: DemonstrationFolder, config: NetworkConfig, *, in_memory: bool
+    ) -> None:
         """Make the store; nothing is read yet.
 
         Args:
@@ -61,6 +66,7 @@ class DecisionStore:
         self._looks: dict[tuple[str, int], _HalfLook] = {}
         self._decisions: dict[int, Decision] = {}
         self._chosen: dict[tuple[int, int, int], np.ndarray] = {}
+        self._objects: dict[tuple[str, int], tuple[np.ndarray, SceneObjects]] = {}
 
     def decision(self, index: int) -> Decision:
         """Return what was said and done.
@@ -105,7 +111,24 @@ class DecisionStore:
             self._chosen[key] = chosen
         thin = replace(decision, wordings=(replace(said, similarity=said.similarity[chosen]),))
         demonstration = Demonstration(look=look.take(chosen), decision=thin, scene="")
-        return demonstration.observation(), decision.candidates
+        observation = demonstration.observation()
+        if self.config.uses_objects:
+            objects = self._objects_of(self._look_keys[index], look, said.similarity)
+            observation = replace(observation, objects=objects)
+        return observation, decision.candidates
+
+    def _objects_of(
+        self, key: tuple[str, int], look: _HalfLook, similarity: np.ndarray
+    ) -> SceneObjects:
+        """Objects of the whole look; only their similarity depends on the wording."""
+        found = self._objects.get(key)
+        if found is None:
+            points, features = look.look.points, look.features.astype(np.float32)
+            labels = object_labels(points)
+            found = labels, pool_objects(points, features, similarity, labels)
+            self._objects[key] = found
+        labels, objects = found
+        return replace(objects, similarity=label_means(similarity, labels))
 
     def _read(self, index: int) -> tuple[_HalfLook, Decision]:
         key = self._look_keys[index]

@@ -12,8 +12,9 @@ from torch import nn
 from tqdm import tqdm
 
 from policy.demonstrations import DemonstrationFolder
+from policy.network.base import CandidateNetwork
 from policy.network.checkpoint import save_checkpoint
-from policy.network.model import SRNetwork
+from policy.network.kinds import make_network
 from policy.training.config import TrainConfig
 from policy.training.distributed import Ranks
 from policy.training.draws import ExampleBatch, ExampleDrawer
@@ -67,7 +68,7 @@ class Trainer:
         )
         network_config = config.network_config(self.folder.feature_dim)
         torch.manual_seed(config.seed)
-        self.network = SRNetwork(network_config).to(ranks.device)
+        self.network = make_network(network_config).to(ranks.device)
         self.averaged = copy.deepcopy(self.network).requires_grad_(False)
         store = DecisionStore(self.folder, network_config, in_memory=self._fits_memory())
         self.drawer = ExampleDrawer(store, config)
@@ -251,7 +252,7 @@ class Trainer:
         for average, parameter in pairs:
             average.lerp_(parameter, 1 - decay)
 
-    def _kept_network(self) -> SRNetwork:
+    def _kept_network(self) -> CandidateNetwork:
         return self.averaged if self.config.averaging else self.network
 
     def _modules(self) -> dict[str, nn.Module]:

@@ -9,14 +9,17 @@ from policy.base import Policy
 from policy.errors import InvalidConfigError, MissingCheckpointError, UnknownPolicyError
 from policy.registry import POLICY_NAMES, load_policy
 
-NAMES = "grounding, random, clip-grounding, lerf-togo, think-grasp, vlp, base, sr-a, sr"
+NAMES = (
+    "grounding, random, clip-grounding, lerf-togo, think-grasp, vlp, raw-image, raw-image-grid, "
+    "a2, vlg, base, sr-a, sr"
+)
 
 
 def test_names() -> None:
     assert POLICY_NAMES == tuple(NAMES.split(", "))
 
 
-@pytest.mark.parametrize("name", NAMES.split(", ")[:6])
+@pytest.mark.parametrize("name", NAMES.split(", ")[:8])
 def test_policies_without_weights(name: str) -> None:
     loaded = load_policy(name)
     assert isinstance(loaded, Policy)
@@ -45,8 +48,9 @@ def test_missing_weights(tmp_path: Path) -> None:
     with pytest.raises(MissingCheckpointError) as caught:
         load_policy("sr", checkpoint=weights)
     assert str(caught.value) == (
-        f"No weights for the policy 'sr': missing {weights} and {card}. Pass "
-        "checkpoint=FILE.safetensors, or use the policy 'grounding', which needs no weights."
+        f"No weights for the policy 'sr': missing {weights} and {card}. Train them with "
+        "python -m policy.train --variant sr and pass checkpoint=FILE.safetensors, or use the "
+        "policy 'grounding', which needs none."
     )
 
 

@@ -13,7 +13,10 @@ from policy.observation import Observation
 
 # Not `segments`: its inner loop calls a function for every pair of neighbours.
 install_import_hook(
-    [f"policy.baselines.{name}" for name in ("clip_grounding", "lerf_togo", "think_grasp", "vlp")],
+    [
+        f"policy.baselines.{name}"
+        for name in ("clip_grounding", "lerf_togo", "raw_image", "think_grasp", "vlp")
+    ],
     "beartype.beartype",
 )
 

@@ -70,8 +70,6 @@ def test_looks_for_weights_of_its_own(
     policy: type[SRPolicy], stem: str, tmp_path: Path, make_config, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The file that is shipped under the policy's name, beside those of `sr`."""
-    monkeypatch.setattr(
-        "policy.baselines.ablations.DEFAULT_CHECKPOINT", tmp_path / "sr.safetensors"
-    )
+    monkeypatch.setattr("policy.learnt.WEIGHTS", tmp_path)
     _save(tmp_path / f"{stem}.safetensors", make_config, stem)
     assert load_policy(policy.name).name == policy.name

@@ -39,8 +39,10 @@ _LOOKS_LIKE = _unit(np.random.default_rng(1).normal(size=(NUM_CONCEPTS, CHANNELS
 _CALLED = _unit(np.random.default_rng(2).normal(size=(NUM_CONCEPTS, CHANNELS)))
 
 
-def _look(concepts: np.ndarray, num_points: int, rng: np.random.Generator) -> tuple[Look, Any]:
-    """Clusters of points, one an object, and the objects' centres."""
+def _look(
+    concepts: np.ndarray, num_points: int, rng: np.random.Generator
+) -> tuple[Look, Any, np.ndarray]:
+    """Clusters of points, one an object; the objects' centres; and which points are of which."""
     centers = rng.permutation([[0.38, -0.1], [0.5, 0.1], [0.62, -0.1], [0.38, 0.1]])[
         : len(concepts)
     ]
@@ -54,22 +56,30 @@ def _look(concepts: np.ndarray, num_points: int, rng: np.random.Generator) -> tu
         workspace_min=LOWER,
         workspace_max=UPPER,
     )
-    return look, centers
+    return look, centers, owner
 
 
-def _wording(concept: int, num_points: int, number: int, rng: np.random.Generator) -> Wording:
+def _wording(
+    concept: int, num_points: int, number: int, rng: np.random.Generator, bonus: np.ndarray | float
+) -> Wording:
     pooled = _unit(_CALLED[concept] + rng.normal(scale=0.02 * number, size=CHANNELS))
     return Wording(
         text=f"give me concept {concept}, said in way {number}",
         tokens=np.stack([pooled, _unit(rng.normal(size=CHANNELS))]),
         pooled=pooled,
         phrase_pooled=pooled,
-        similarity=rng.uniform(0.1, 0.2, num_points),
+        similarity=rng.uniform(0.1, 0.2, num_points) + bonus,
     )
 
 
 def _decision(
-    target: int, concepts: np.ndarray, centers: Any, phase: str, num_points: int, rng: Any
+    target: int,
+    concepts: np.ndarray,
+    centers: Any,
+    phase: str,
+    num_points: int,
+    rng: Any,
+    bonus: np.ndarray | float = 0.0,
 ) -> Decision:
     owner = np.repeat(np.arange(len(concepts)), GRASPS)
     poses = np.tile(np.eye(4), (len(owner), 1, 1))
@@ -81,7 +91,7 @@ def _decision(
         phase=phase,
         relation="on" if phase == "place" else None,
         side="inside" if phase == "place" else None,
-        wordings=tuple(_wording(concepts[target], num_points, n, rng) for n in range(3)),
+        wordings=tuple(_wording(concepts[target], num_points, n, rng, bonus) for n in range(3)),
         candidates=ActionCandidates(
             kind=phase,
             Ts_world_tool=poses[order],
@@ -98,19 +108,30 @@ def _decision(
 
 @pytest.fixture(scope="session")
 def write_scenes() -> SceneWriter:
-    """Writes scenes of three objects, each of them asked for once for a pick and once for a place."""
+    """Writes scenes of three objects, each of them asked for once for a pick and once for a place.
 
-    def write(folder: Path, num_scenes: int, *, num_points: int = 40, first: int = 0) -> Path:
+    The similarity of the points says nothing, unless `similar`: then it points at the target.
+    """
+
+    def write(
+        folder: Path,
+        num_scenes: int,
+        *,
+        num_points: int = 40,
+        first: int = 0,
+        similar: bool = False,
+    ) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         for scene in range(first, first + num_scenes):
             rng = np.random.default_rng(scene)
             concepts = rng.permutation(NUM_CONCEPTS)[:OBJECTS]
-            look, centers = _look(concepts, num_points, rng)
-            decisions = [
-                (0, _decision(target, concepts, centers, phase, num_points, rng))
-                for target in range(OBJECTS)
-                for phase in ("pick", "place")
-            ]
+            look, centers, owner = _look(concepts, num_points, rng)
+            decisions = []
+            for target in range(OBJECTS):
+                bonus = 0.3 * (owner == target) if similar else 0.0
+                for phase in ("pick", "place"):
+                    decision = _decision(target, concepts, centers, phase, num_points, rng, bonus)
+                    decisions.append((0, decision))
             write_shard(folder / f"scene-{scene:04d}.h5", {"encoder": ENCODER}, [look], decisions)
         return folder
 

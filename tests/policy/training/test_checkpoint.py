@@ -22,7 +22,7 @@ def test_half_precision_is_rounded_once(network: SRNetwork, tmp_path: Path) -> N
     path = tmp_path / "sr.safetensors"
     save_checkpoint(path, network, {"epoch": 3}, encoder="embedded-1", half=True)
     assert {t.dtype for t in load_file(path).values()} == {torch.float16}
-    loaded = load_checkpoint(path).state_dict()
+    loaded = load_checkpoint(path, SRNetwork).state_dict()
     for name, tensor in network.state_dict().items():
         assert loaded[name].dtype == torch.float32
         torch.testing.assert_close(loaded[name], tensor.half().float(), rtol=0, atol=0)
@@ -40,14 +40,14 @@ def test_encoder_fits_or_is_unknown(
 ) -> None:
     path = tmp_path / "sr.safetensors"
     save_checkpoint(path, network, {}, encoder=trained_on)
-    assert isinstance(load_checkpoint(path, encoder=in_use), SRNetwork)
+    assert isinstance(load_checkpoint(path, SRNetwork, encoder=in_use), SRNetwork)
 
 
 def test_another_encoder(network: SRNetwork, tmp_path: Path) -> None:
     path = tmp_path / "sr.safetensors"
     save_checkpoint(path, network, {}, encoder="embedded-1")
     with pytest.raises(InvalidCheckpointError) as caught:
-        load_checkpoint(path, encoder="ViT-L-14:openai-2")
+        load_checkpoint(path, SRNetwork, encoder="ViT-L-14:openai-2")
     assert str(caught.value) == (
         f"{path}: got weights trained on features of the encoder embedded-1, expected "
         "ViT-L-14:openai-2, which is in use. Choose the encoder that they were trained with, or "

@@ -10,6 +10,7 @@ from safetensors.torch import load_file
 
 from policy.errors import InvalidCheckpointError
 from policy.network.checkpoint import load_checkpoint
+from policy.network.model import SRNetwork
 from policy.training.config import TrainConfig
 from policy.training.distributed import Ranks
 from policy.training.logs import RunLog, read_table
@@ -75,7 +76,7 @@ def test_learns_what_words_mean(write_scenes, make_train_config, plain, tmp_path
     assert card["encoder"] == "synthetic-1"
     assert card["training"]["data"]["digest"] == trainer.folder.digest
     # What was kept is what was measured, but for rounding to half precision.
-    kept = load_checkpoint(config.out / "best.safetensors", encoder="synthetic-1")
+    kept = load_checkpoint(config.out / "best.safetensors", SRNetwork, encoder="synthetic-1")
     again = trainer.validator.measure(Objective(kept, config.decoding_weight, torch.float32))
     assert again["val_loss"] == pytest.approx(metrics["val_loss"], abs=0.01)
 
@@ -127,7 +128,8 @@ def test_the_ablations_train(variant: str, make_train_config) -> None:
     train(config)
     rows = read_table(config.out / "steps.csv")
     assert all(math.isfinite(row["loss"]) and row["grad"] > 0 for row in rows)
-    assert load_checkpoint(config.out / "best.safetensors").config.one_align == (variant != "base")
+    kept = load_checkpoint(config.out / "best.safetensors", SRNetwork)
+    assert kept.config.one_align == (variant != "base")
 
 
 def test_validation_is_held_out_by_scene(make_train_config) -> None:
