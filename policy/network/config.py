@@ -7,7 +7,7 @@ from policy.errors import InvalidConfigError
 
 Sparsifier = Literal["relu2", "relu", "softmax"]
 SelfAttention = Literal["diagonal", "full"]
-PointSelection = Literal["balanced", "similar"]
+PointSelection = Literal["balanced", "covering", "similar"]
 LanguageAttention = Literal["gate", "points"]
 Ablation = Literal["base", "sr_a", "sr"]
 
@@ -23,8 +23,8 @@ class NetworkConfig:
         width: Width D of the network; 512 as in section 3.3.1 (A2 uses 768).
         num_heads: Attention heads.
         max_points: Points taken from a cloud of 1500-3000; attention is quadratic in them.
-        point_selection: "balanced": half by similarity, half spread evenly. "similar": the most
-            similar ones only, as A2 does.
+        point_selection: "balanced": half by similarity, half spread evenly. "covering": both halves
+            spread evenly, one over what is similar. "similar": the most similar ones only, as A2.
         max_opening_m: Largest finger opening that can be read out, metres.
         max_refinement_rad: Largest correction of the orientation that can be read out: the
             candidate was checked for collisions as it stands, so only a small one is safe.

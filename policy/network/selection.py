@@ -5,6 +5,9 @@ from jaxtyping import Float, Int
 
 from policy.network.config import PointSelection
 
+_COVERED = 3
+"""How many times as many of the most similar points "covering" spreads its first half over."""
+
 
 def select_points(
     points: Float[np.ndarray, "N 3"],
@@ -20,7 +23,10 @@ def select_points(
         similarity: Similarity to the instruction.
         max_points: Largest number of points.
         method: "balanced": half the most similar points, which hold the target, and half spread
-            evenly over the rest, which hold the surroundings. "similar": the most similar only.
+            evenly over the rest, which hold the surroundings. "covering": the first half spread
+            evenly over three times as many of the most similar points, so that few points show
+            all of what is looked for, its middle and its edge, and not only the side of it that
+            fits best. "similar": the most similar only.
 
     Returns:
         Indices of the chosen points, all of them where there are few enough.
@@ -31,6 +37,11 @@ def select_points(
     by_position = np.lexsort((*points.T, -similarity))
     num_similar = max_points if method == "similar" else max_points // 2
     similar, rest = by_position[:num_similar], by_position[num_similar:]
+    if method == "covering" and num_similar:
+        region = by_position[: _COVERED * num_similar]
+        first = _farthest_points(points[region[1:]], points[region[:1]], num_similar - 1)
+        similar = region[np.concatenate([[0], 1 + first])]
+        rest = by_position[~np.isin(by_position, similar)]
     spread = _farthest_points(points[rest], points[similar], max_points - num_similar)
     return np.concatenate([similar, rest[spread]])
 

@@ -20,7 +20,7 @@ from policy.network.config import SRConfig, ablation_switches
         ({"self_attention": "no"}, "self_attention: got 'no', expected one of diagonal, full."),
         (
             {"point_selection": "all"},
-            "point_selection: got 'all', expected one of balanced, similar.",
+            "point_selection: got 'all', expected one of balanced, covering, similar.",
         ),
         (
             {"language_attention": "both"},
