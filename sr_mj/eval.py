@@ -1,8 +1,8 @@
 """Evaluate policies: the protocol's suites, or random scenes, many episodes, one report.
 
-    python -m sr_mj.eval --suite grasp --policy grounding --out outputs/grasp
-    python -m sr_mj.eval --suite all --policy sr sr@base.safetensors --workers 2 --out outputs/all
-    python -m sr_mj.eval --suite all --policy sr sr@base.safetensors --out outputs/all --resume
+    python -m sr_mj.eval --suite grasp --policy sr grounding --out outputs/grasp
+    python -m sr_mj.eval --suite all --policy sr sr@mine.safetensors --workers 2 --out outputs/all
+    python -m sr_mj.eval --suite all --policy sr sr@mine.safetensors --out outputs/all --resume
     python -m sr_mj.eval --scene cluttered15 --seeds 100 120 --policy grounding --out outputs/dev
     python -m sr_mj.eval --report outputs/grasp outputs/place --out outputs/both
 
@@ -43,7 +43,7 @@ class EvalConfig:
     seed is a scene."""
     split: Literal["seen", "unseen", "both"] = "both"
     """Objects. Random scenes with both are made of seen objects."""
-    policy: tuple[str, ...] = ("grounding",)
+    policy: tuple[str, ...] = ("sr",)
     """Policies to compare, besides oracle and random: NAME, or NAME@CHECKPOINT for weights of your
     own, which results call NAME@ and the file's stem."""
     runs: int = 15

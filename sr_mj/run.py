@@ -50,9 +50,10 @@ class RunConfig:
     goal: str | None = None
     """Instruction in free words, such as "give me the banana, put it near the bowl"; drawn from
     templates by default."""
-    policy: str = "grounding"
-    """How a grasp or place is chosen: grounding; the baselines random, clip-grounding, lerf-togo,
-    think-grasp, vlp, raw-image, raw-image-grid; the trained sr, base, sr-a, a2, vlg; or oracle,
+    policy: str = "sr"
+    """How a grasp or place is chosen: sr, the trained network; its ablations sr-a and base;
+    grounding, which needs no weights and takes any encoder; the baselines random, clip-grounding,
+    lerf-togo, think-grasp, vlp, raw-image, raw-image-grid; a2 and vlg with --checkpoint; or oracle,
     which reads ground truth and marks the ceiling."""
     generator: str = "antipodal"
     """Where grasps come from: antipodal (our sampler), or a learnt generator's file:PATH or

@@ -31,7 +31,7 @@ class PictureConfig:
     """Kind of scene, or arrangement."""
     goal: str | None = None
     """Instruction; drawn by default."""
-    policy: str = "grounding"
+    policy: str = "sr"
     """How grasp or place is chosen."""
     seed: int = 0
     """Seed of the run."""

@@ -91,7 +91,8 @@ def load_checkpoint(
         raise InvalidCheckpointError(
             f"{path}: got weights trained on features of the encoder {trained_on}, expected "
             f"{' or '.join(accepted)}, which is in use. Choose the encoder that they were trained "
-            "with, or train anew with python -m policy.train on demonstrations of this one."
+            "with, train anew with python -m policy.train on demonstrations of this one, or use "
+            "the policy 'grounding', which takes any encoder."
         )
     network = network_type(config)
     try:

@@ -65,7 +65,7 @@ def test_the_main_job_end_to_end(command, tmp_path):
     lines = done.stdout.splitlines()
     assert lines[0] == "Scene  cluttered15 (seen, seed 4), 15 objects"
     assert re.fullmatch(r"Goal   '.+'", lines[1])
-    assert lines[2] == "Policy grounding, encoder embedded"
+    assert lines[2] == "Policy sr, encoder embedded"
     assert re.match(r"Result (success|failure): .+ \[[\d.]+ s\]$", lines[-1])
 
     out = tmp_path / "o"
@@ -231,7 +231,8 @@ def test_absent_weights_are_one_line_and_nothing_is_downloaded(command, tmp_path
     assert "ViT-B-16" in done.stderr
 
 
-def test_an_untrained_sr_policy_is_refused(command):
-    done = command("sr_mj.run", "--scene", "single", "--policy", "sr")
+def test_missing_weights_of_a_policy_are_one_line(command):
+    done = command("sr_mj.run", "--scene", "single", "--checkpoint", "nowhere.safetensors")
     assert done.returncode == 2 and done.stdout == ""
+    assert "nowhere.safetensors" in done.stderr and done.stderr.count("\n") == 1
     assert done.stderr.startswith("error: ") and "grounding" in done.stderr

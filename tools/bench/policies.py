@@ -83,7 +83,7 @@ def bench_setting(config: BenchConfig) -> "Setting":
     from sr_mj.evaluation.setting import BLANK, Setting
     from sr_mj.provenance import git_revision, package_versions
 
-    is_blank = config.encoder == BLANK
+    encoder = None if config.encoder == BLANK else load_encoder(config.encoder)
     chosen = {choice.label: choice for choice in read_policies(config.policies)}
     # By its full name, so that other processes find it.
     from tools.bench import policies
@@ -91,7 +91,8 @@ def bench_setting(config: BenchConfig) -> "Setting":
     return Setting(
         policies=tuple(c for c in chosen.values() if _is_asked_for(c.label, config)),
         encoder=config.encoder,
-        encoder_fingerprint=BLANK if is_blank else load_encoder(config.encoder).fingerprint,
+        encoder_fingerprint=BLANK if encoder is None else encoder.fingerprint,
+        encoder_fingerprints=(BLANK,) if encoder is None else tuple(encoder.fingerprints),
         attempts=config.attempts,
         versions=package_versions(),
         revision=git_revision(),

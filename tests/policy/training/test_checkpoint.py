@@ -50,8 +50,9 @@ def test_another_encoder(network: SRNetwork, tmp_path: Path) -> None:
         load_checkpoint(path, SRNetwork, encoder="ViT-L-14:openai-2")
     assert str(caught.value) == (
         f"{path}: got weights trained on features of the encoder embedded-1, expected "
-        "ViT-L-14:openai-2, which is in use. Choose the encoder that they were trained with, or "
-        "train anew with python -m policy.train on demonstrations of this one."
+        "ViT-L-14:openai-2, which is in use. Choose the encoder that they were trained with, "
+        "train anew with python -m policy.train on demonstrations of this one, or use the policy "
+        "'grounding', which takes any encoder."
     )
 
 
