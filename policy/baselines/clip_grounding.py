@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Float
 
 from policy.actions import ActionCandidates, ActionScores
-from policy.baselines.segments import means, owners, ranks, segment
 from policy.grounding import GroundingPolicy
 from policy.observation import Observation
+from policy.segments import means, owners, ranks, segment
 
 
 class ClipGroundingPolicy:
@@ -15,7 +15,7 @@ class ClipGroundingPolicy:
     The original compares CLIP's feature of the image inside each detected bounding box with the
     instruction, and draws one of the grasps that belong to the best box. Simplified here:
 
-    - Boxes are those of the cloud's segments (`policy.baselines.segments`), in space instead of in
+    - Boxes are those of the cloud's segments (`policy.segments`), in space instead of in
       an image. As in the original, a box holds whatever reaches into it.
     - The feature of a box is the normalised mean of the features of its points, not that of a
       separate crop; it is compared with the phrase that says what to pick.

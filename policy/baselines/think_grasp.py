@@ -5,9 +5,9 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import ConvexHull, KDTree, QhullError
 
 from policy.actions import ActionCandidates, ActionScores
-from policy.baselines.segments import means, owners, segment
 from policy.grounding import GroundingPolicy
 from policy.observation import Observation
+from policy.segments import means, owners, segment
 
 # What is higher than the target's nearest point by more than a voxel lies above it.
 _CLEARANCE_M = 0.01
@@ -28,7 +28,7 @@ class ThinkGraspPolicy:
       similarity to the phrase. What lies on it is found by a rule: at least 6 points of another
       segment, inside the outline of the target seen from above (its convex hull), each more than
       10 mm higher than the nearest point of the target. The one with the highest top goes first.
-    - Segments (`policy.baselines.segments`) stand for LangSAM's crop, and the candidates' prior
+    - Segments (`policy.segments`) stand for LangSAM's crop, and the candidates' prior
       for the score of the grasp network. The model's choice of a part of the object is left out.
     - Nothing is remembered from one attempt to the next, as in the original.
     - The original only grasps. In the place phase, this is the policy `grounding`.

@@ -5,9 +5,9 @@ from jaxtyping import Float
 from scipy.spatial import KDTree
 
 from policy.actions import ActionCandidates, ActionScores
-from policy.baselines.segments import means, segment
 from policy.grounding import GroundingPolicy
 from policy.observation import Observation, PlaceSide
+from policy.segments import means, segment
 
 # The protocol's ring around a reference, from its edge.
 _RING_M = (0.05, 0.15)
@@ -23,7 +23,7 @@ class VlpPolicy:
     The original grounds the reference by CLIP on object boxes and goes to the highest point that
     satisfies reference and relation, whatever else is there. Simplified here:
 
-    - The reference is the segment of the cloud (`policy.baselines.segments`) with the highest mean
+    - The reference is the segment of the cloud (`policy.segments`) with the highest mean
       similarity to the phrase that names it.
     - The point is chosen among the place candidates, all with the same object in the gripper:
       inside means over the middle third of the reference's box, outside 0.05 to 0.15 m from its

@@ -11,13 +11,12 @@ from torch import Tensor
 
 from policy.actions import ActionCandidates
 from policy.arrays import check_range, checked_array
-from policy.baselines.objects import find_objects
 from policy.errors import InvalidArrayError
 from policy.network.config import NetworkConfig
 from policy.network.objects import ObjectBatch, collate_objects
 from policy.network.padding import pad
 from policy.network.selection import select_points
-from policy.objects import SceneObjects
+from policy.objects import SceneObjects, find_objects
 from policy.observation import Observation
 
 PHASES = ("pick", "place", "place inside", "place outside")

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from policy.actions import ActionCandidates
-from policy.baselines.objects import label_means, object_labels, pool_objects
 from policy.demonstrations import Decision, Demonstration, DemonstrationFolder, Look
 from policy.network.config import NetworkConfig
 from policy.network.selection import select_points
-from policy.objects import SceneObjects
+from policy.objects import SceneObjects, label_means, object_labels, pool_objects
 from policy.observation import Observation
 
 # A wording's texts and similarities, a decision's candidates; measured on cluttered scenes.

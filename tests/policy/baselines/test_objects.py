@@ -4,9 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from policy.baselines.objects import find_objects, object_labels
 from policy.errors import InvalidArrayError
-from policy.objects import SceneObjects
+from policy.objects import SceneObjects, find_objects, object_labels
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from policy.baselines.segments import MIN_POINTS, means, owners, ranks, segment
+from policy.segments import MIN_POINTS, means, owners, ranks, segment
 
 
 def _same_partition(first: np.ndarray, second: np.ndarray) -> bool:
