@@ -51,18 +51,21 @@ def page(
     Returns:
         HTML that needs no other file.
     """
-    contents = " · ".join(f'<a href="#{t.name}">{html.escape(t.title)}</a>' for t in tables)
+    arranged = _arrangements(lines, pictures)
+    if arranged:
+        arranged.insert(0, "<h2 id='arrangements'>Arrangements</h2>")
+    links = [f'<a href="#{t.name}">{html.escape(t.title)}</a>' for t in tables]
+    links += ["<a href='#arrangements'>Arrangements</a>"] if arranged else []
     parts = [
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">',
         f"<title>{html.escape(title)}</title><style>{_STYLE}</style></head><body>",
         f"<h1>{html.escape(title)}</h1>",
         *(f"<p>{html.escape(text)}</p>" for text in intro),
         *(f'<p class="note">{html.escape(text)}</p>' for text in notes),
-        f"<p>{contents} · <a href='#arrangements'>Arrangements</a></p>",
+        f"<p>{' · '.join(links)}</p>",
         *_charts(lines),
         *(table.html() for table in tables),
-        "<h2 id='arrangements'>Arrangements</h2>",
-        *_arrangements(lines, pictures),
+        *arranged,
         "</body></html>\n",
     ]
     return "\n".join(parts)
@@ -74,7 +77,8 @@ def _charts(lines: Lines) -> list[str]:
         policies = by_policy(records)
         title = f"{group.task}, {group.split} objects, {group.condition}"
         bars = [_bar(group, score(label, own)) for label, own in policies.items()]
-        charts.append(rate_chart(f"{title}: success in per cent (diamond: published)", bars))
+        legend = " (diamond: published)" if any(bar.published is not None for bar in bars) else ""
+        charts.append(rate_chart(f"{title}: success in per cent{legend}", bars))
         failed = [(label, len(own), causes(own)) for label, own in policies.items()]
         if any(parts for _, _, parts in failed):
             charts.append(stacked_chart(f"{title}: causes of failure", failed))

@@ -24,7 +24,12 @@ _AS_PUBLISHED = (
 
 
 def paper_tables(lines: Lines) -> tuple[Table, ...]:
-    """Return the paper's tables 1 to 4 beside ours; empty cells are what nobody has measured."""
+    """Return the paper's tables 1 to 4 beside ours; empty cells are what nobody has measured.
+
+    Random scenes have no place in them: without an episode on a fixed arrangement there are none.
+    """
+    if all(record["arrangement_sha256"] is None for record in lines.values()):
+        return ()
     scores = {
         group: [score(label, own) for label, own in by_policy(records).items()]
         for group, records in by_group(lines).items()

@@ -196,6 +196,20 @@ def test_ours_stand_beside_what_was_published(tmp_path, dones, as_lines, make_do
     assert rows["ours: sr (ReLU²)"]["clean"] == ""
 
 
+def test_random_scenes_are_not_set_beside_what_was_published(tmp_path, make_done, as_lines):
+    lines = as_lines(
+        [make_done("sr", seed, scene="place8", task="random-place8") for seed in (0, 1)]
+    )
+    write_report(tmp_path, lines, {})
+    page = (tmp_path / "report.html").read_text()
+    assert "random-place8, seen objects, clean: success in per cent<" in page
+    assert "published" not in page and "#arrangements" not in page
+    assert_balanced(page)
+    links = set(re.findall(r"href=[\"']#([^\"']+)", page))
+    assert links == set(re.findall(r"id=[\"']([^\"']+)", page))
+    assert not list((tmp_path / "tables").glob("paper-*.csv"))
+
+
 def test_published_figures_agree_with_each_other():
     both = {(e.task, e.policy): e for e in TABLE_1 if e.policy == "sr"}
     assert both == {(e.task, e.policy): e for e in TABLE_3 if e.policy == "sr"}
