@@ -82,8 +82,13 @@ def joined(device: str) -> Iterator[Ranks]:
     if size == 1:
         yield Ranks(rank=0, size=1, device=device)
         return
-    dist.init_process_group("gloo" if device == "cpu" else "nccl")
+    store, rank, size = next(dist.rendezvous("env://"))
+    backend = "gloo" if device == "cpu" else "nccl"
+    dist.init_process_group(backend, store=store, rank=rank, world_size=size)
     try:
         yield Ranks(rank=rank, size=size, device=device)
+        # gloo fails where a peer hangs up before the last exchange was read: leave together.
+        store.set(f"done/{rank}", "")
+        store.wait([f"done/{peer}" for peer in range(size)])
     finally:
         dist.destroy_process_group()

@@ -38,11 +38,13 @@ def test_two_processes_learn_like_one(scenes: Path, make_train_config, tmp_path:
         trainer.run(log, StopSignal())
     command = (
         *(sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"),
+        "--local-addr=127.0.0.1",
         *("-m", "policy.train", "--data", str(scenes), "--out", str(tmp_path / "two"), *OPTIONS),
         *("--network", "num_heads=4", "num_dssa_layers=1", "--batch", str(batch), "--epochs", "4"),
         *("--val-share", "0.25", "--warmup", "5", "--lr", "1e-3", "--precision", "float32"),
     )
-    subprocess.run(command, check=True, capture_output=True, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
     for name, columns in (
         ("steps.csv", ("loss", "choice", "decoding", "grad", "top1")),
         ("epochs.csv", ("val_loss", "val_top1", "gate_entropy", "alpha_sparse_0")),
