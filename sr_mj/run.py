@@ -53,7 +53,7 @@ class RunConfig:
     policy: str = "sr"
     """How a grasp or place is chosen: sr, the trained network; its ablations sr-a and base;
     grounding, which needs no weights and takes any encoder; the baselines random, clip-grounding,
-    lerf-togo, think-grasp, vlp, raw-image, raw-image-grid; a2 and vlg with --checkpoint; or oracle,
+    lerf-togo, think-grasp, vlp, raw-image, raw-image-grid, and the trained a2 and vlg; or oracle,
     which reads ground truth and marks the ceiling."""
     generator: str = "antipodal"
     """Where grasps come from: antipodal (our sampler), or a learnt generator's file:PATH or

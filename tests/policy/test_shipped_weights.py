@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from perception import load_encoder
 from policy.actions import ActionCandidates
 from policy.errors import InvalidCheckpointError
 from policy.learnt import WEIGHTS
@@ -12,7 +13,7 @@ from policy.network.config import ablation_switches
 from policy.observation import Observation
 from policy.registry import load_policy
 
-SHIPPED = {"sr": "sr", "sr-a": "sr_a", "base": "base"}
+SHIPPED = {"sr": "sr", "sr-a": "sr_a", "base": "base", "a2": "a2", "vlg": "vlg"}
 
 
 @pytest.fixture(params=SHIPPED)
@@ -25,14 +26,24 @@ def card(name):
     return json.loads((WEIGHTS / f"{SHIPPED[name]}.json").read_text())
 
 
+@pytest.fixture(scope="module")
+def texts():
+    """Features of three names, (3, D), in the space that the weights know."""
+    encoder = load_encoder("embedded")
+    return np.stack([encoder.encode_text(x).pooled for x in ("a banana", "a mug", "scissors")])
+
+
 def test_nothing_else_is_shipped():
     assert {path.stem for path in WEIGHTS.iterdir()} == set(SHIPPED.values())
 
 
 def test_they_are_small_and_of_their_variant(name, card):
     assert (WEIGHTS / f"{SHIPPED[name]}.safetensors").stat().st_size < 24e6
-    switches = ablation_switches(SHIPPED[name])
-    assert {key: card["config"][key] for key in switches} == switches
+    if name in ("a2", "vlg"):
+        assert card["kind"] == name
+    else:
+        switches = ablation_switches(SHIPPED[name])
+        assert {key: card["config"][key] for key in switches} == switches
 
 
 def test_the_card_says_where_they_come_from(name, card):
@@ -50,7 +61,7 @@ def test_they_were_trained_alike():
     trainings = [card["training"] for card in cards]
     differing = {"variant", "out"}
     options = [{k: v for k, v in t["options"].items() if k not in differing} for t in trainings]
-    assert options[0] == options[1] == options[2]
+    assert all(other == options[0] for other in options)
     assert len({t["data"]["digest"] for t in trainings}) == 1
     assert len({card["encoder"] for card in cards}) == 1
 
@@ -60,18 +71,19 @@ def test_they_refuse_features_of_another_encoder(name):
         load_policy(name, encoder="ViT-L-14-0123")
 
 
-def test_they_find_what_is_asked_for(name, card):
+@pytest.mark.parametrize("asked", range(3))
+def test_they_find_what_is_asked_for(name, texts, asked):
     """Three blobs of points: one has the feature of the phrase, and grasps on it win."""
-    rng = np.random.default_rng(0)
-    size = card["config"]["feature_dim"]
-    wanted, *others = np.linalg.qr(rng.normal(size=(size, 3)))[0].T.astype(np.float32)
+    rng = np.random.default_rng(asked)
+    wanted = texts[asked]
     middles = np.array([[0.45, -0.1, 0.03], [0.5, 0.1, 0.03], [0.6, 0.0, 0.03]])
     owner = np.repeat(np.arange(3), 100)
-    features = np.stack([wanted, *others])[owner]
+    features = texts[owner] + rng.normal(scale=0.02, size=(300, len(wanted))).astype(np.float32)
+    features /= np.linalg.norm(features, axis=1, keepdims=True)
     observation = Observation(
         points=(middles[owner] + rng.normal(scale=0.01, size=(300, 3))).astype(np.float32),
         features=features,
-        similarity=(owner == 0).astype(np.float32),
+        similarity=features @ wanted,
         confidence=np.ones(300, np.float32),
         text_tokens=wanted[None],
         text_pooled=wanted,
@@ -88,5 +100,5 @@ def test_they_find_what_is_asked_for(name, card):
         width_m=np.full(30, 0.05),
         prior=np.full(30, 0.5),
     )
-    scores = load_policy(name).score(observation, candidates, rng)
-    assert scores.logits[grip == 0].min() > scores.logits[grip != 0].max()
+    logits = load_policy(name).score(observation, candidates, rng).logits
+    assert logits[grip == asked].min() > logits[grip != asked].max()
