@@ -3,13 +3,13 @@
 import numpy as np
 from jaxtyping import Float
 
-from policy.actions import ActionCandidates, ActionScores
-from policy.grounding import GroundingPolicy
+from policy.actions import ActionCandidates
+from policy.baselines.one_phase import OnePhasePolicy
 from policy.observation import Observation
 from policy.segments import means, owners, ranks, segment
 
 
-class ClipGroundingPolicy:
+class ClipGroundingPolicy(OnePhasePolicy):
     """Grasps the object whose box is most similar to the phrase, with a grasp drawn at random.
 
     The original compares CLIP's feature of the image inside each detected bounding box with the
@@ -26,33 +26,22 @@ class ClipGroundingPolicy:
 
     name = "clip-grounding"
 
-    def __init__(self) -> None:
-        """Make the policy."""
-        self._placing = GroundingPolicy()
-
-    def score(
+    def _logits(
         self, observation: Observation, candidates: ActionCandidates, rng: np.random.Generator
-    ) -> ActionScores:
-        """Score grasps by the rank of their object, and at random within an object.
-
-        Args:
-            observation: The scene's feature cloud and the instruction.
-            candidates: K candidates; K may be 0.
-            rng: Draws the order of the grasps of an object; nothing for places.
+    ) -> Float[np.ndarray, " K"]:
+        """Rank grasps by their object, and at random within an object.
 
         Returns:
             K logits: the rank of the object among all, 0 for the least similar, plus a fraction
-            drawn for each grasp. Without points, the fraction alone.
+            that `rng` draws for each grasp. Without points, the fraction alone.
         """
-        if candidates.kind == "place":
-            return self._placing.score(observation, candidates, rng)
         draws = rng.permutation(len(candidates)) / max(len(candidates), 1)
         if not (observation.num_points and len(candidates)):
-            return ActionScores(logits=draws)
+            return draws
         labels = segment(observation.points)
         similarity = _box_similarity(observation, labels)
         chosen = owners(observation.points, labels, candidates.positions)
-        return ActionScores(logits=ranks(similarity)[chosen] + draws)
+        return ranks(similarity)[chosen] + draws
 
 
 def _box_similarity(observation: Observation, labels: np.ndarray) -> Float[np.ndarray, " S"]:

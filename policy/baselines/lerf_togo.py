@@ -6,8 +6,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from policy.actions import ActionCandidates, ActionScores
-from policy.grounding import GroundingPolicy
+from policy.actions import ActionCandidates
+from policy.baselines.one_phase import OnePhasePolicy
 from policy.observation import Observation
 
 _SCALES_M = (0.012, 0.02, 0.03, 0.04)
@@ -20,7 +20,7 @@ _CONTACT_M = 0.02
 _SEMANTIC, _GEOMETRIC = 0.95, 0.05
 
 
-class LerfTogoPolicy:
+class LerfTogoPolicy(OnePhasePolicy):
     """Grasps the object that is most relevant at the best scale; elsewhere nothing counts.
 
     The original fits a language-embedded radiance field to many views of a scene, asks it at many
@@ -42,28 +42,17 @@ class LerfTogoPolicy:
 
     name = "lerf-togo"
 
-    def __init__(self) -> None:
-        """Make the policy."""
-        self._placing = GroundingPolicy()
-
-    def score(
+    def _logits(
         self, observation: Observation, candidates: ActionCandidates, rng: np.random.Generator
-    ) -> ActionScores:
-        """Score grasps on the object by semantics and geometry, all others below them.
-
-        Args:
-            observation: The scene's feature cloud and the instruction.
-            candidates: K candidates; K may be 0.
-            rng: Not used.
+    ) -> Float[np.ndarray, " K"]:
+        """Rank grasps on the object by semantics and geometry, all others below them.
 
         Returns:
             K logits: 1 to 2 on the object, 0 to 1 elsewhere. Without points, the prior alone.
         """
-        if candidates.kind == "place":
-            return self._placing.score(observation, candidates, rng)
         prior = candidates.prior.astype(np.float64)
         if not (observation.num_points and len(candidates)):
-            return ActionScores(logits=prior)
+            return prior
         points = observation.points.astype(np.float64)
         tree = KDTree(points)
         relevancy = multi_scale_relevancy(observation, tree)
@@ -76,7 +65,7 @@ class LerfTogoPolicy:
         spread = max(float(np.ptp(relevancy)), 1e-9)
         semantic = (semantic - relevancy.min()) / spread
         logits = _SEMANTIC * semantic + _GEOMETRIC * prior
-        return ActionScores(logits=logits + on_object[nearest])
+        return logits + on_object[nearest]
 
 
 def multi_scale_relevancy(observation: Observation, tree: KDTree) -> Float[np.ndarray, " N"]:

@@ -5,43 +5,29 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Float
 
-from policy.actions import ActionCandidates, ActionScores
+from policy.actions import ActionCandidates
 from policy.arrays import checked_array
+from policy.baselines.one_phase import OnePhasePolicy
 from policy.errors import MissingImagesError
-from policy.grounding import GroundingPolicy
 from policy.images import ImageSource
 from policy.observation import Observation
 
 
-class _PartsPolicy:
+class _PartsPolicy(OnePhasePolicy):
     """Grasps in the part of the pictures that is most similar to the phrase."""
 
-    name: ClassVar[str]
     num_parts: ClassVar[int]
 
-    def __init__(self) -> None:
-        """Make the policy."""
-        self._placing = GroundingPolicy()
-
-    def score(
+    def _logits(
         self, observation: Observation, candidates: ActionCandidates, rng: np.random.Generator
-    ) -> ActionScores:
-        """Score grasps by the most similar part in which they appear, then by the prior.
-
-        Args:
-            observation: The instruction and the pictures; for places, the cloud.
-            candidates: K candidates; K may be 0, and no picture is then described.
-            rng: Not used.
+    ) -> Float[np.ndarray, " K"]:
+        """Rank grasps by the most similar part in which they appear, then by the prior.
 
         Returns:
             K logits: the rank of the similarity of a grasp's part among those of all grasps, from
-            0, plus half of the prior. Grasps that are in no picture rank last.
-
-        Raises:
-            MissingImagesError: If there are grasps to score, but no pictures.
+            0, plus half of the prior. Grasps that are in no picture rank last. Without grasps, no
+            picture is described.
         """
-        if candidates.kind == "place":
-            return self._placing.score(observation, candidates, rng)
         logits = candidates.prior.astype(np.float64) / 2
         if len(candidates):
             if observation.images is None:
@@ -56,7 +42,7 @@ class _PartsPolicy:
             )
             # Equal similarity is the same part; half of the prior never outweighs a rank.
             logits = logits + np.unique(similarity, return_inverse=True)[1]
-        return ActionScores(logits=logits)
+        return logits
 
 
 class RawImageGridPolicy(_PartsPolicy):
@@ -73,6 +59,9 @@ class RawImageGridPolicy(_PartsPolicy):
     - A crop's feature is the mean over the encoder's map of the crop alone.
     - What hides a grasp from a view is not asked: a crop knows no depth.
     - The original only grasps. In the place phase, this is the policy `grounding`.
+
+    Raises:
+        MissingImagesError: By `score`, if there are grasps to score, but no pictures.
     """
 
     name = "raw-image-grid"

@@ -4,9 +4,10 @@ import math
 
 import torch
 from jaxtyping import Bool, Float
-from torch import Tensor, nn
+from torch import Tensor
 
-from policy.network.attention import masked_softmax, merge_heads, scaled_scores, split_heads
+from policy.network.attention import masked_softmax, scaled_scores
+from policy.network.projections import ProjectedAttention
 
 NUM_AXES = 3
 # Wavelengths in units of half the workspace: from twice its width to 28 mm in the standard one, as
@@ -54,7 +55,7 @@ def rotate(
     return torch.cat([part.to(x.dtype) for part in turned] + [rest], dim=-1)
 
 
-class RotaryAttention(nn.Module):
+class RotaryAttention(ProjectedAttention):
     """Multi-head cross-attention with rotary positions in space."""
 
     def __init__(self, width: int, num_heads: int, *, local_heads: bool) -> None:
@@ -66,12 +67,7 @@ class RotaryAttention(nn.Module):
             local_heads: Start half of the heads with equal biases of queries and keys. Their
                 product, turned, is a sum of cosines of the distance, which is largest at 0.
         """
-        super().__init__()
-        self.num_heads = num_heads
-        self.query = nn.Linear(width, width)
-        self.key = nn.Linear(width, width)
-        self.value = nn.Linear(width, width)
-        self.out = nn.Linear(width, width)
+        super().__init__(width, num_heads, key_bias=True)
         head_dim = width // num_heads
         num_pairs = NUM_AXES * len(rotary_frequencies(head_dim))
         bias = torch.zeros(num_heads, head_dim)
@@ -102,23 +98,6 @@ class RotaryAttention(nn.Module):
         Returns:
             Rows that sum to 1, or to 0 where no key is valid.
         """
-        q = rotate(split_heads(self.query(queries), self.num_heads), query_positions)
-        k = rotate(split_heads(self.key(keys), self.num_heads), key_positions)
+        q, k = self.queries_and_keys(queries, keys)
+        q, k = rotate(q, query_positions), rotate(k, key_positions)
         return masked_softmax(scaled_scores(q, k), key_mask[:, None, None])
-
-    def gather(
-        self,
-        weights: Float[Tensor, "batch heads queries keys"],
-        values: Float[Tensor, "batch keys width"],
-    ) -> Float[Tensor, "batch queries width"]:
-        """Let every query gather values.
-
-        Args:
-            weights: From `weights`.
-            values: What is gathered.
-
-        Returns:
-            One row for each query.
-        """
-        v = split_heads(self.value(values), self.num_heads)
-        return self.out(merge_heads(weights @ v))

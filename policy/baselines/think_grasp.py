@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import ConvexHull, KDTree, QhullError
 
-from policy.actions import ActionCandidates, ActionScores
-from policy.grounding import GroundingPolicy
+from policy.actions import ActionCandidates
+from policy.baselines.one_phase import OnePhasePolicy
 from policy.observation import Observation
 from policy.segments import means, owners, segment
 
@@ -17,7 +17,7 @@ _MIN_COVERING = 6
 _CLASS = 2.0
 
 
-class ThinkGraspPolicy:
+class ThinkGraspPolicy(OnePhasePolicy):
     """Grasps the target, or the highest object that lies on it as long as there is one.
 
     The original shows the scene to a vision-language model (GPT-4o), which names the object to
@@ -36,29 +36,18 @@ class ThinkGraspPolicy:
 
     name = "think-grasp"
 
-    def __init__(self) -> None:
-        """Make the policy."""
-        self._placing = GroundingPolicy()
-
-    def score(
+    def _logits(
         self, observation: Observation, candidates: ActionCandidates, rng: np.random.Generator
-    ) -> ActionScores:
-        """Score grasps: the occluder, then the target, then everything else by similarity.
-
-        Args:
-            observation: The scene's feature cloud and the instruction.
-            candidates: K candidates; K may be 0.
-            rng: Not used.
+    ) -> Float[np.ndarray, " K"]:
+        """Rank grasps: the occluder, then the target, then everything else by similarity.
 
         Returns:
             K logits; within the occluder and the target, the prior decides. Without points, it
             decides alone.
         """
-        if candidates.kind == "place":
-            return self._placing.score(observation, candidates, rng)
         logits = candidates.prior.astype(np.float64)
         if not (observation.num_points and len(candidates)):
-            return ActionScores(logits=logits)
+            return logits
         points = observation.points.astype(np.float64)
         labels = segment(points)
         similarity = means(observation.similarity, labels)
@@ -71,7 +60,7 @@ class ThinkGraspPolicy:
         logits[mine == target] += _CLASS
         if occluder != target:
             logits[mine == occluder] += 2 * _CLASS
-        return ActionScores(logits=logits)
+        return logits
 
 
 def find_occluder(

@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from policy.actions import ActionCandidates, ActionScores
-from policy.grounding import GroundingPolicy
+from policy.actions import ActionCandidates
+from policy.baselines.one_phase import OnePhasePolicy
 from policy.observation import Observation, PlaceSide
 from policy.segments import means, segment
 
@@ -17,7 +17,7 @@ _MIN_INSIDE_M = 0.02
 _LEVEL_M = 0.005
 
 
-class VlpPolicy:
+class VlpPolicy(OnePhasePolicy):
     """Places at the highest spot over the middle of the reference, or in the ring around it.
 
     The original grounds the reference by CLIP on object boxes and goes to the highest point that
@@ -35,31 +35,21 @@ class VlpPolicy:
     """
 
     name = "vlp"
+    phase = "place"
 
-    def __init__(self) -> None:
-        """Make the policy."""
-        self._picking = GroundingPolicy()
-
-    def score(
+    def _logits(
         self, observation: Observation, candidates: ActionCandidates, rng: np.random.Generator
-    ) -> ActionScores:
-        """Score places by relation first, then by height, then by the prior.
-
-        Args:
-            observation: The scene's feature cloud and the instruction.
-            candidates: K candidates; K may be 0.
-            rng: Not used.
+    ) -> Float[np.ndarray, " K"]:
+        """Rank places by relation first, then by height, then by the prior.
 
         Returns:
             K logits: for places that satisfy the relation their level, in steps of 5 mm from the
             lowest candidate, plus half of the prior; for others minus their distance from
             satisfying it, in metres. Without points, the prior alone.
         """
-        if candidates.kind == "pick":
-            return self._picking.score(observation, candidates, rng)
         prior = candidates.prior.astype(np.float64)
         if not (observation.num_points and len(candidates)):
-            return ActionScores(logits=prior)
+            return prior
         labels = segment(observation.points)
         similarity = means(observation.similarity, labels)
         reference = observation.points[labels == similarity.argmax(), :2].astype(np.float64)
@@ -67,7 +57,7 @@ class VlpPolicy:
         heights = candidates.positions[:, 2]
         levels = np.round((heights - heights.min()) / _LEVEL_M)
         # Half of the prior: a level above always wins.
-        return ActionScores(logits=np.where(missing_m > 0, -missing_m, levels + prior / 2))
+        return np.where(missing_m > 0, -missing_m, levels + prior / 2)
 
 
 def distance_to_relation(

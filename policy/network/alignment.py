@@ -6,17 +6,12 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
-from policy.network.attention import (
-    MultiHeadAttention,
-    masked_softmax,
-    merge_heads,
-    scaled_scores,
-    split_heads,
-)
+from policy.network.attention import MultiHeadAttention, masked_softmax, scaled_scores
 from policy.network.batch import PHASES, SRBatch
 from policy.network.bias import CandidateBias, candidate_basis
 from policy.network.config import SRConfig
 from policy.network.encoding import fourier_features, mlp, num_fourier_features
+from policy.network.projections import merge_heads, split_heads
 
 # Score that a cosine similarity of 1 starts with in the semantic mask. CLIP's own temperature
 # would be 100; but a head sees a random part of the channels, and its cosine is off by up to 0.2.

@@ -4,7 +4,9 @@ import math
 
 import torch
 from jaxtyping import Bool, Float
-from torch import Tensor, nn
+from torch import Tensor
+
+from policy.network.projections import ProjectedAttention
 
 
 def masked_softmax(scores: Float[Tensor, "*dims"], mask: Bool[Tensor, "*#dims"]) -> Tensor:
@@ -25,16 +27,6 @@ def masked_softmax(scores: Float[Tensor, "*dims"], mask: Bool[Tensor, "*#dims"])
     return (scores + penalty).softmax(dim=-1) * mask
 
 
-def split_heads(x: Float[Tensor, "batch items width"], num_heads: int) -> Tensor:
-    """Split channels into heads: (batch, items, width) to (batch, heads, items, head_dim)."""
-    return x.unflatten(-1, (num_heads, -1)).transpose(1, 2)
-
-
-def merge_heads(x: Float[Tensor, "batch heads items head_dim"]) -> Tensor:
-    """Concatenate heads: (batch, heads, items, head_dim) to (batch, items, width)."""
-    return x.transpose(1, 2).flatten(2)
-
-
 def scaled_scores(
     queries: Float[Tensor, "batch heads queries head_dim"],
     keys: Float[Tensor, "batch heads keys head_dim"],
@@ -43,7 +35,7 @@ def scaled_scores(
     return (queries / math.sqrt(queries.shape[-1])) @ keys.transpose(-1, -2)
 
 
-class MultiHeadAttention(nn.Module):
+class MultiHeadAttention(ProjectedAttention):
     """Multi-head attention, softmax(QKᵀ/√d)V (eq. 4), with a mask for padded keys."""
 
     def __init__(self, width: int, num_heads: int) -> None:
@@ -53,13 +45,8 @@ class MultiHeadAttention(nn.Module):
             width: Channels of queries, keys, values and output.
             num_heads: Heads; divides the width.
         """
-        super().__init__()
-        self.num_heads = num_heads
-        self.query = nn.Linear(width, width)
         # A bias on the keys shifts all scores of a query alike, which the softmax cancels.
-        self.key = nn.Linear(width, width, bias=False)
-        self.value = nn.Linear(width, width)
-        self.out = nn.Linear(width, width)
+        super().__init__(width, num_heads, key_bias=False)
 
     def weights(
         self,
@@ -79,24 +66,5 @@ class MultiHeadAttention(nn.Module):
         Returns:
             Rows that sum to 1, or to 0 where no key is valid.
         """
-        q = split_heads(self.query(queries), self.num_heads)
-        k = split_heads(self.key(keys), self.num_heads)
-        scores = scaled_scores(q, k)
+        scores = scaled_scores(*self.queries_and_keys(queries, keys))
         return masked_softmax(scores if bias is None else scores + bias, key_mask[:, None, None])
-
-    def gather(
-        self,
-        weights: Float[Tensor, "batch heads queries keys"],
-        values: Float[Tensor, "batch keys width"],
-    ) -> Float[Tensor, "batch queries width"]:
-        """Let every query gather values.
-
-        Args:
-            weights: From `weights`.
-            values: What is gathered.
-
-        Returns:
-            One row for each query; zeros plus the output bias where no key is valid.
-        """
-        v = split_heads(self.value(values), self.num_heads)
-        return self.out(merge_heads(weights @ v))

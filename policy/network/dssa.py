@@ -6,9 +6,9 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from policy.network.attention import merge_heads, split_heads
 from policy.network.bias import RelativePositionBias
 from policy.network.config import Sparsifier
+from policy.network.projections import merge_heads, split_heads
 
 # Score of padding: far below any other, yet finite in half precision.
 _PADDING_SCORE = -3e4

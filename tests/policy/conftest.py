@@ -30,6 +30,7 @@ install_import_hook(
                 "loss",
                 "model",
                 "morton",
+                "projections",
                 "selection",
             )
         ),

@@ -15,7 +15,7 @@ from policy.observation import Observation
 install_import_hook(
     [
         f"policy.baselines.{name}"
-        for name in ("clip_grounding", "lerf_togo", "raw_image", "think_grasp", "vlp")
+        for name in ("clip_grounding", "lerf_togo", "one_phase", "raw_image", "think_grasp", "vlp")
     ],
     "beartype.beartype",
 )
