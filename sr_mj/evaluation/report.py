@@ -16,6 +16,7 @@ from sr_mj.evaluation.tables import (
     cause_table,
     comparison_table,
     goal_table,
+    overview_table,
     second_table,
     success_table,
 )
@@ -73,8 +74,10 @@ def write_report(out: Path, lines: Lines, seconds: Seconds, pictures: Sequence[P
     """
     # Episodes end in any order; a report is the same whatever it was.
     lines = {episode: lines[episode] for episode in sorted(lines)}
+    success = success_table(lines)
     tables = [
-        success_table(lines),
+        overview_table(lines),
+        success,
         comparison_table(lines),
         cause_table(lines),
         *paper_tables(lines),
@@ -92,7 +95,7 @@ def write_report(out: Path, lines: Lines, seconds: Seconds, pictures: Sequence[P
         (folder / f"{table.name}.csv").write_text(table.csv())
     html = page(_TITLE, intro, notes, tables, lines, pictures)
     (out / "report.html").write_text(html)
-    shown = "\n".join(tables[0].markdown().splitlines()[4:])
+    shown = "\n".join(success.markdown().splitlines()[4:])
     told = "".join(f"Note: {note}\n" for note in notes)
     return f"{shown}\n{told}Report {out / 'report.html'}, {out / 'report.md'}, {folder}"
 

@@ -3,7 +3,7 @@
 from statistics import fmean
 from typing import Any
 
-from sr_mj.evaluation.plan import Episode
+from sr_mj.evaluation.plan import REFERENCES, Episode
 from sr_mj.evaluation.results import Lines
 from sr_mj.evaluation.statistics import wilson
 from sr_mj.evaluation.summary import (
@@ -57,6 +57,34 @@ def success_table(lines: Lines) -> Table:
         ),
         rows=tuple(rows),
     )
+
+
+def overview_table(lines: Lines) -> Table:
+    """Return the success of every policy, a column for every task and kind of objects."""
+    groups = {g: by_policy(own) for g, own in by_group(lines).items() if g.condition == "clean"}
+    labels = dict.fromkeys(label for policies in groups.values() for label in policies)
+    order = sorted(labels, key=lambda label: (label in REFERENCES, label))
+    rows = [
+        (label, *(_success_of(label, policies.get(label)) for policies in groups.values()))
+        for label in order
+    ]
+    return Table(
+        name="overview",
+        title="Overview",
+        note=(
+            "Success in per cent under plain conditions, with 95 % Wilson intervals over all "
+            "episodes that were started."
+        ),
+        columns=(
+            Column(name="policy"),
+            *(Column(name=f"{g.task}, {g.split}", style="percent") for g in groups),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def _success_of(label: str, records: list[dict[str, Any]] | None) -> Cell:
+    return score(label, records).success if records else None
 
 
 def comparison_table(lines: Lines) -> Table:

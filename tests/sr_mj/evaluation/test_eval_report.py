@@ -29,6 +29,7 @@ from sr_mj.evaluation.summary import (
     score,
 )
 from sr_mj.evaluation.table import Column, Table
+from sr_mj.evaluation.tables import overview_table
 
 GOOD, BAD = ("grasped_target",), ("wrong_object", "slip_lift")
 
@@ -60,6 +61,19 @@ def test_scores_count_every_episode(dones, as_lines, make_done):
     assert s.reward == (3 * 1.0 + -0.25) / 4
     assert causes(policies["sr"]) == [("error", 1), ("pick: slip_lift", 1)]
     assert score("oracle", policies["oracle"]).title == "oracle (reads ground truth)"
+
+
+def test_overview_has_a_column_for_each_task_and_plain_episodes_only(dones, as_lines, make_done):
+    other = [make_done("grounding", 0, split="unseen", scene="grasp-unseen-00")]
+    noisy = [make_done("sr", 0, condition="points-0.1", reasons=BAD)]
+    table = overview_table(as_lines([*dones, *other, *noisy]))
+    assert [column.name for column in table.columns] == ["policy", "grasp, seen", "grasp, unseen"]
+    assert table.rows == (
+        ("grounding", None, wilson(1, 1)),
+        ("sr", wilson(3, 4), None),
+        ("oracle", wilson(4, 4), None),
+        ("random", wilson(1, 4), None),
+    )
 
 
 def test_differences_are_paired(dones, as_lines):
