@@ -177,7 +177,9 @@ def _place(
         situation = situation or _assess_places(scene, pipeline, rngs, describe_held)
         attempt = _attempt(scene, pipeline, rngs, index, situation)
         yield attempt
-        if not attempt.outcome.reason.is_idle:
+        reason = attempt.outcome.reason
+        is_lost = pipeline.keep_unreachable and reason is Reason.UNREACHABLE
+        if is_lost or not reason.is_idle:
             return
 
 
@@ -245,12 +247,22 @@ def _plan(
     cloud: GeometryCloud,
     held: HeldObject | None,
 ) -> Plan | None:
-    if pipeline.perturbation is not None:
-        candidates = pipeline.perturbation.apply(candidates, rngs.perturbation)
     # With unreachable candidates among them, the policy's choice is final.
     order = order[:1] if pipeline.keep_unreachable else order
     start = None if held is None else pipeline.executor.drive.arm_qpos
-    return pipeline.planner.plan(candidates, order, obstacles=cloud.points, held=held, start=start)
+    plan = pipeline.planner.plan(candidates, order, obstacles=cloud.points, held=held, start=start)
+    if plan is None or pipeline.perturbation is None:
+        return plan
+    # An error is nothing that a planner knows: it does not change the choice, and where the erring
+    # pose touches something, that is what the robot runs into.
+    erring = pipeline.perturbation.apply(candidates.take([plan.chosen]), rngs.perturbation)
+    for obstacles in (cloud.points, None):
+        erred = pipeline.planner.plan(
+            erring, np.array([0]), obstacles=obstacles, held=held, start=start
+        )
+        if erred is not None:
+            return replace(erred, chosen=plan.chosen)
+    return None
 
 
 def _act(

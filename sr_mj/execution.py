@@ -112,7 +112,7 @@ class Executor:
     def _pick(
         self, plan: Plan, segments: dict[Phase, Segment], judge: Judge, keep_target: bool
     ) -> Outcome:
-        reason, held = self._grasp(segments, judge)
+        reason, held, felt_to_end = self._grasp(segments, judge)
         if reason.is_grasp:
             is_kept = keep_target and reason is Reason.GRASPED_TARGET
             if not is_kept:
@@ -127,19 +127,26 @@ class Executor:
             grasped=held if reason.is_grasp else None,
             knocked_off=knocked_off,
             reward=1.0 if success else judge.grasp_reward(plan.T_world_tool[:3, 3]),
+            felt_to_end=felt_to_end,
         )
 
-    def _grasp(self, segments: dict[Phase, Segment], judge: Judge) -> tuple[Reason, str | None]:
-        """Reach, close, lift and carry; a grasp that is felt to be empty ends at home."""
+    def _grasp(
+        self, segments: dict[Phase, Segment], judge: Judge
+    ) -> tuple[Reason, str | None, bool]:
+        """Reach, close, lift and carry; a grasp that is felt to be empty ends at home.
+
+        Returns:
+            How it ended, what was lifted, and whether the fingers felt something to the end.
+        """
         self._move(segments[Phase.TRANSIT])
         error = self._move(segments[Phase.APPROACH])
         if error > self.config.blocked_tol_rad:
             self._go_back(segments, (Phase.APPROACH, Phase.TRANSIT))
-            return Reason.APPROACH_COLLISION, None
+            return Reason.APPROACH_COLLISION, None, False
         self.drive.close()
         if not self.drive.feels_object:
             self._go_back(segments, (Phase.APPROACH, Phase.TRANSIT))
-            return Reason.EMPTY_CLOSE, None
+            return Reason.EMPTY_CLOSE, None, False
         self.T_world_grasp = self.drive.T_world_tool
         self._move(segments[Phase.LIFT])
         held = judge.lifted_object(self.config.min_rise_m)
@@ -147,15 +154,15 @@ class Executor:
         self._move(segments[Phase.CARRY])
         if not self.drive.feels_object:
             self._move(segments[Phase.RETURN])
-            return (Reason.SLIPPED_LIFT if held is None else Reason.SLIPPED_CARRY), held
+            return (Reason.SLIPPED_LIFT if held is None else Reason.SLIPPED_CARRY), held, False
         if held is None:
             self._drop_into_bin(segments)
-            return Reason.SLIPPED_LIFT, None
+            return Reason.SLIPPED_LIFT, None, True
         if np.linalg.norm(judge.position_in_tool(held) - grip) > self.config.max_slip_m:
             self._drop_into_bin(segments)
-            return Reason.SLIPPED_CARRY, held
+            return Reason.SLIPPED_CARRY, held, True
         is_target = held in self._scene.goal.targets
-        return (Reason.GRASPED_TARGET if is_target else Reason.GRASPED_OTHER), held
+        return (Reason.GRASPED_TARGET if is_target else Reason.GRASPED_OTHER), held, True
 
     def _place(self, plan: Plan, segments: dict[Phase, Segment], judge: Judge) -> Outcome:
         moved = object_in_gripper(self._scene)

@@ -133,10 +133,10 @@ class Judge:
 
     def place_reason(self, moved: str) -> Reason:
         """Say how the placing of an object ended, once everything is calm."""
-        if any(is_placed(self._scene, moved, region) for region in self._regions):
-            return Reason.PLACED
         if self._has_left(_center(self._scene, moved)):
             return Reason.KNOCKED_OFF
+        if any(is_placed(self._scene, moved, region) for region in self._regions):
+            return Reason.PLACED
         if not self.is_calm(moved):
             return Reason.TIMED_OUT
         turn = self._scene.T_world_object(moved)[:3, :3] @ self._release.T
@@ -147,13 +147,15 @@ class Judge:
     def missed_m(self, moved: str) -> float | None:
         """Return the distance from an object to the nearest valid place; None without regions.
 
-        An object that is where it should be, but touches what it should not, has missed by 1 mm.
+        An object that is where it should be, but touches what it should not or lies outside the
+        workspace, has missed by 1 mm.
         """
         if not self._regions:
             return None
         gaps = []
+        has_left = self._has_left(_center(self._scene, moved))
         for region in self._regions:
-            if is_placed(self._scene, moved, region):
+            if is_placed(self._scene, moved, region) and not has_left:
                 return 0.0
             gap = self._gap(region, shapely.Point(_center(self._scene, moved)[:2]))
             gaps.append(max(gap, _TOUCHED_MISS_M))
@@ -167,7 +169,7 @@ class Judge:
         return max(RING_M[0] - distance, distance - RING_M[1], 0.0)
 
     def _distance(self, name: str, position: np.ndarray) -> float:
-        """Return the distance of a position to a target's surface, as it was at the start."""
+        """Return the distance of a position to a target's nearest vertex, as it was at the start."""
         vertices, pose = find_object(self._scene, name).asset.vertices, self._targets[name]
         return float(KDTree(vertices @ pose[:3, :3].T + pose[:3, 3]).query(position)[0])
 

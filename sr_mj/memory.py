@@ -13,7 +13,7 @@ _NEAR_RAD = np.radians(30)
 class FailedGrasps:
     """The poses at which grasps have failed since the scene last changed by a grasp.
 
-    Everything here is known to a real robot: it feels that its fingers closed on nothing.
+    Everything here is known to a real robot: it feels whether its fingers hold something.
     """
 
     def __init__(self) -> None:
@@ -21,13 +21,13 @@ class FailedGrasps:
         self._poses: list[np.ndarray] = []
 
     def record(self, plan: Plan | None, outcome: Outcome) -> None:
-        """Remember a failed grasp; forget all once an object was removed.
+        """Remember a failed grasp; forget all once something was carried away.
 
         Args:
             plan: What was executed, if anything was.
             outcome: What came of it.
         """
-        if outcome.reason.is_grasp:
+        if outcome.felt_to_end:
             self._poses.clear()
         elif plan is not None:
             self._poses.append(plan.T_world_tool)

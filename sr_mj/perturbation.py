@@ -15,9 +15,8 @@ _LARGEST_M, _LARGEST_DEG = 0.1, 90.0
 class PosePerturbation:
     """Normally distributed errors of position and orientation.
 
-    The policy chooses among the poses as they were proposed; what is then planned and executed is
-    the chosen pose with its error. The error of every candidate is drawn, so that a next choice,
-    where the first cannot be executed, has an error of its own.
+    The choice is made, and found to be feasible, among the poses as they were proposed; what is
+    executed is the chosen pose with its error, even if it touches something.
 
     Attributes:
         sigma_m: Standard deviation of the position along each axis, metres.

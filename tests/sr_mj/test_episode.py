@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.ur5 import HOME_QPOS
-from policy.actions import ActionCandidates
+from policy.actions import ActionCandidates, ActionScores
 from policy.baselines.random import RandomPolicy
 from sr_mj.account import attempt_record, describe_attempt, describe_result, episode_record
 from sr_mj.assemble import assembled, lifter_for, make_policy
@@ -14,7 +14,7 @@ from sr_mj.outcome import Reason
 from sr_mj.perturbation import PosePerturbation
 from sr_mj.planning import Planner
 from sr_mj.scene import Goal, PlaceGoal, SceneConfig, make_scene
-from sr_mj.scene.placement import is_placed, place_region
+from sr_mj.scene.placement import find_object, is_placed, place_region
 
 OBJECTS = ("block_cube", "tuna_can", "lemon", "banana", "apple", "plum", "red_bowl", "orange")
 
@@ -194,3 +194,51 @@ def test_the_executed_pose_is_perturbed_and_the_choice_is_not(act):
         plans.append(attempt.plan.T_world_tool)
     np.testing.assert_array_equal(plans[0], plans[1])
     assert 1e-3 < np.linalg.norm(plans[0][:3, 3] - NEAR) < 0.05
+
+
+class Prefers:
+    """Likes candidates in the order in which they were proposed."""
+
+    name = "prefers"
+
+    def score(self, observation, candidates, rng):
+        return ActionScores(logits=-np.arange(len(candidates), dtype=float))
+
+
+class Lowers:
+    """Errs by a known distance downwards."""
+
+    def __init__(self, distance_m):
+        self.shift = np.array([0, 0, -distance_m])
+
+    def apply(self, candidates, rng):
+        poses = candidates.Ts_world_tool.copy()
+        poses[:, :3, 3] += self.shift
+        return replace(candidates, Ts_world_tool=poses)
+
+
+def test_an_error_changes_neither_the_choice_nor_is_it_avoided(act):
+    scene = make_scene(SceneConfig(scene="place8", objects=OBJECTS, seed=2))
+    x, y, _ = scene.data.xipos[find_object(scene, "tuna_can").body.body_id]
+    over_can, lower_m = (x, y, 0.1), 0.08
+    changes = {"generator": Proposes("pick", over_can, NEAR), "policy": Prefers()}
+    for perturbation, z in ((None, 0.1), (Lowers(lower_m), 0.1 - lower_m)):
+        (attempt,) = act(
+            "a lemon", changes=changes | {"perturbation": perturbation}, max_attempts=1
+        )[1]
+        assert attempt.plan.chosen == 0
+        np.testing.assert_allclose(attempt.plan.T_world_tool[:3, 3], (x, y, z))
+    # It ran into the can, which the planner would have avoided.
+    assert attempt.outcome.reason in (Reason.APPROACH_COLLISION, Reason.GRASPED_OTHER)
+    lowered = [np.subtract(over_can, (0, 0, lower_m)), NEAR]
+    (attempt,) = act(
+        "a lemon", changes=changes | {"generator": Proposes("pick", *lowered)}, max_attempts=1
+    )[1]
+    assert attempt.plan.chosen == 1
+
+
+def test_a_place_that_cannot_be_reached_is_final_if_kept(act):
+    changes = {"placer": Proposes("place", FAR), "keep_unreachable": True}
+    attempts = act("give me the lemon, put it near the apple", changes=changes)[1]
+    (place,) = (a for a in attempts if a.kind == "place")
+    assert place.outcome.reason is Reason.UNREACHABLE

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from sr_mj.judge import Judge, object_in_gripper, touching_fingers
 from sr_mj.outcome import Reason
 from sr_mj.scene import Goal, PlaceGoal, SceneConfig, make_scene
-from sr_mj.scene.placement import find_object
+from sr_mj.scene.placement import find_object, is_placed, place_region
 
 OBJECTS = ("red_bowl", "lemon", "banana", "orange", "apple", "block_cube", "plum", "tuna_can")
 
@@ -84,6 +84,19 @@ def test_what_leaves_the_table_was_knocked_off(scene):
     assert set(judge.knocked_off(None)) == {"block_cube", "plum"}
     # They are gone already when the next attempt begins.
     assert Judge(scene).knocked_off(None) == ()
+
+
+def test_what_lies_where_it_should_but_outside_the_workspace_was_knocked_off(scene):
+    edge = scene.workspace.upper[0]
+    place = PlaceGoal(relation="near", references=("tuna_can",))
+    scene = replace(scene, goal=replace(scene.goal, place=place))
+    put(scene, "tuna_can", (edge - 0.07, 0.1, 0.04))
+    judge = judge_of_placing(scene, "block_cube")
+    put(scene, "block_cube", (edge + 0.05, 0.1, 0.04))
+    region = place_region(scene, "near", "tuna_can", moved="block_cube")
+    assert is_placed(scene, "block_cube", region)
+    assert judge.place_reason("block_cube") is Reason.KNOCKED_OFF
+    assert judge.missed_m("block_cube") > 0
 
 
 def test_what_lies_in_the_bin_was_not_knocked_off(scene):
