@@ -169,7 +169,7 @@ class Judge:
         return max(RING_M[0] - distance, distance - RING_M[1], 0.0)
 
     def _distance(self, name: str, position: np.ndarray) -> float:
-        """Return the distance of a position to a target's nearest vertex, as it was at the start."""
+        """Return the distance of a position to a target's nearest vertex at the start."""
         vertices, pose = find_object(self._scene, name).asset.vertices, self._targets[name]
         return float(KDTree(vertices @ pose[:3, :3].T + pose[:3, 3]).query(position)[0])
 

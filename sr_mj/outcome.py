@@ -49,8 +49,9 @@ class Outcome:
         grasped: Name of the object that was held, if any.
         knocked_off: Names of the objects that left the workspace or the table by accident.
         reward: 1 for a success; otherwise minus the distance by which it was missed, in diagonals
-            of the workspace: of the executed pose to the nearest vertex of a target, or of the object that was
-            placed to the nearest valid region. -1 if nothing was executed or nothing is valid.
+            of the workspace: of the executed pose to the nearest vertex of a target, or of the
+            object that was placed to the nearest valid region. -1 if nothing was executed or
+            nothing is valid.
         missed_m: Distance by which a place attempt missed the region; None for others.
         felt_to_end: The fingers felt something until the end of the carry: all that the robot
             itself knows of a grasp.
