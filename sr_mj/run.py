@@ -122,15 +122,23 @@ def _scene_configs(config: RunConfig) -> "tuple[SceneConfig, ...]":
 
 
 def _check_goal(config: RunConfig) -> None:
-    """Refuse a goal that only says where to place, in a scene where "it" is nothing in particular.
+    """Refuse a scene of which no goal can be drawn, and a goal that does not say what to pick.
 
-    Arrangements say what "it" is.
+    Arrangements have goals of their own, and say what "it" is in one that only says where to place.
     """
     from sr_mj.instruction import names_target
     from sr_mj.scene import SCENE_KINDS
 
+    kind = SCENE_KINDS.get(config.scene)
+    if kind is None:
+        return
+    if config.goal is None and not kind.num_objects:
+        raise ConfigError(
+            f"The scene {config.scene!r} has no objects from which to draw a goal; state one with "
+            "--goal, or choose another scene, such as 'single'."
+        )
     goal = (config.goal or "").strip()
-    if goal and config.scene in SCENE_KINDS and not names_target(goal):
+    if goal and not names_target(goal):
         raise ConfigError(
             f"The goal {goal!r} does not say what to pick; say it first, as in "
             f"'give me the apple, {goal}', or choose a place arrangement."

@@ -183,39 +183,24 @@ def test_bad_parts_are_refused(fields, message):
     assert str(caught.value) == message
 
 
-def _support(part: CollisionPart, direction: np.ndarray) -> float:
-    """Reach of a part along a unit direction."""
-    turn = Rotation.from_quat(part.quat_wxyz, scalar_first=True)
-    local, size = turn.inv().apply(direction), part.size
-    reach = {
-        "box": lambda: float(np.abs(local) @ size),
-        "sphere": lambda: size[0],
-        "ellipsoid": lambda: float(np.linalg.norm(local * size)),
-        "capsule": lambda: size[0] + abs(local[2]) * size[1],
-        "cylinder": lambda: size[0] * np.hypot(local[0], local[1]) + abs(local[2]) * size[1],
-        "convex": lambda: float((part.vertices @ local).max()),
-    }[part.kind]()
-    return float(np.dot(part.position, direction)) + reach
-
-
 @pytest.mark.parametrize("make", [collision.capsule, collision.rod])
-def test_capsules_and_rods_reach_both_ends(make):
+def test_capsules_and_rods_reach_both_ends(make, reach):
     start, end = np.array([0.1, -0.2, 0.3]), np.array([-0.2, 0.1, -0.4])
     part = make(0.01, start, end)
     axis = (end - start) / np.linalg.norm(end - start)
     cap = 0.01 if part.kind == "capsule" else 0.0
-    assert _support(part, axis) == pytest.approx(float(end @ axis) + cap, abs=1e-8)
-    assert _support(part, -axis) == pytest.approx(float(-start @ axis) + cap, abs=1e-8)
+    assert reach(part, axis) == pytest.approx(float(end @ axis) + cap, abs=1e-8)
+    assert reach(part, -axis) == pytest.approx(float(-start @ axis) + cap, abs=1e-8)
 
 
 @pytest.mark.parametrize("name", object_names())
-def test_collision_parts_follow_the_mesh(name):
+def test_collision_parts_follow_the_mesh(name, reach):
     asset = build(name)
     for direction in np.concatenate([np.eye(3), -np.eye(3)]):
         seen = float((asset.vertices @ direction).max())
-        felt = max(_support(part, direction) for part in asset.collision)
+        felt = max(reach(part, direction) for part in asset.collision)
         # What is felt is seen; thin stems, leaves and tails are seen but not felt.
         assert felt - seen < 0.0025
         assert seen - felt < 0.025
     below = np.array([0.0, 0.0, -1.0])
-    assert max(_support(part, below) for part in asset.collision) == pytest.approx(0, abs=0.0012)
+    assert max(reach(part, below) for part in asset.collision) == pytest.approx(0, abs=0.0012)

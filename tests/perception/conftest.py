@@ -1,13 +1,15 @@
 """Synthetic views for the tests of perception: ray casting, no simulator."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import open3d as o3d
 import pytest
 import torch
+import torch.nn.functional as F
 from jaxtyping import install_import_hook
 
+from perception.encoders.base import TextFeatures
 from perception.views import CameraView, Intrinsics
 
 # Shapes in annotations are checked in the modules that compute; the containers check themselves,
@@ -88,6 +90,39 @@ def render_view(
         intrinsics=intrinsics,
         T_world_cam_cv=pose,
     )
+
+
+class ColorEncoder:
+    """Text space = RGB: cells hold the mean colour, words the colour they name, others all three."""
+
+    name = "color"
+    fingerprint = "color-1"
+    fingerprints = ("color-1",)
+    feature_dim = 3
+
+    def __init__(self) -> None:
+        self.num_images = 0
+        self.texts: list[str] = []
+
+    def encode_dense(self, images: Sequence[np.ndarray]) -> torch.Tensor:
+        self.num_images += len(images)
+        pixels = torch.from_numpy(np.stack(images)).permute(0, 3, 1, 2).float() + 1.0
+        return F.normalize(F.avg_pool2d(pixels, 4), dim=1)
+
+    def encode_text(self, text: str) -> TextFeatures:
+        self.texts.append(text)
+        words = text.split()
+        pooled = np.full(3, 1e-3, np.float32)
+        for channel, word in enumerate(("red", "green", "blue")):
+            pooled[channel] += word in words
+        pooled /= np.linalg.norm(pooled)
+        return TextFeatures(pooled=pooled, tokens=np.tile(pooled, (len(words), 1)))
+
+
+@pytest.fixture(scope="session")
+def make_color_encoder() -> type[ColorEncoder]:
+    """Makes encoders that know three colours and count what they are asked."""
+    return ColorEncoder
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -1,16 +1,12 @@
 """Scenes that answer questions: `MultiViewLifter.lift`, `LiftedScene`, `fit_config`, heat maps."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
-import torch.nn.functional as F
 
 from perception.cloud import FeatureCloud
-from perception.encoders.base import TextFeatures
 from perception.errors import (
     EmptyCloudError,
     InvalidCloudError,
@@ -28,36 +24,10 @@ CENTERS = {"red": (0.5, 0.08), "green": (0.44, -0.09), "blue": (0.6, -0.05)}
 WORKSPACE = (0.3, -0.2, -0.01, 0.7, 0.2, 0.3)
 
 
-class ColorEncoder:
-    """Text space = RGB: cells hold the colour, words the colour they name, "table" all three."""
-
-    name = "color"
-    fingerprint = "color-1"
-    fingerprints = ("color-1",)
-    feature_dim = 3
-
-    def __init__(self) -> None:
-        self.num_images = 0
-        self.texts: list[str] = []
-
-    def encode_dense(self, images: Sequence[np.ndarray]) -> torch.Tensor:
-        self.num_images += len(images)
-        pixels = torch.from_numpy(np.stack(images)).permute(0, 3, 1, 2).float() + 1.0
-        return F.normalize(F.avg_pool2d(pixels, 4), dim=1)
-
-    def encode_text(self, text: str) -> TextFeatures:
-        self.texts.append(text)
-        pooled = np.full(3, 1e-3, np.float32)
-        for channel, word in enumerate(("red", "green", "blue")):
-            pooled[channel] += word in text.split()
-        pooled /= np.linalg.norm(pooled)
-        return TextFeatures(pooled=pooled, tokens=pooled[None])
-
-
 @pytest.fixture(scope="module")
-def scene(table_views: tuple[CameraView, ...]) -> LiftedScene:
+def scene(table_views: tuple[CameraView, ...], make_color_encoder) -> LiftedScene:
     config = fit_config(table_views, workspace=WORKSPACE)
-    return MultiViewLifter(ColorEncoder(), config).lift(table_views)
+    return MultiViewLifter(make_color_encoder(), config).lift(table_views)
 
 
 def test_phrases_find_their_objects(scene: LiftedScene) -> None:
@@ -93,8 +63,10 @@ def test_composite_instructions_find_both(scene: LiftedScene) -> None:
     assert (only_place.phrase, only_place.reference) == ("blue cylinder", None)
 
 
-def test_questions_cost_only_their_text(table_views: tuple[CameraView, ...]) -> None:
-    encoder = ColorEncoder()
+def test_questions_cost_only_their_text(
+    table_views: tuple[CameraView, ...], make_color_encoder
+) -> None:
+    encoder = make_color_encoder()
     lifter = MultiViewLifter(encoder, fit_config(table_views, workspace=WORKSPACE))
     scene = lifter.lift(table_views)
     assert (encoder.num_images, encoder.texts) == (3, [])
@@ -107,17 +79,19 @@ def test_questions_cost_only_their_text(table_views: tuple[CameraView, ...]) -> 
     assert encoder.num_images == 3
 
 
-def test_perceive_and_query_agree(table_views: tuple[CameraView, ...]) -> None:
-    lifter = MultiViewLifter(ColorEncoder(), fit_config(table_views, workspace=WORKSPACE))
+def test_perceive_and_query_agree(table_views: tuple[CameraView, ...], make_color_encoder) -> None:
+    lifter = MultiViewLifter(make_color_encoder(), fit_config(table_views, workspace=WORKSPACE))
     percept = lifter.perceive(table_views, "give me the red ball")
     answer = lifter.lift(table_views).query("give me the red ball")
     assert percept.features.similarity.tobytes() == answer.cloud.similarity.tobytes()
     assert percept.target_phrase == answer.phrase
 
 
-def test_saved_scenes_answer_as_before(scene: LiftedScene, tmp_path: Path) -> None:
+def test_saved_scenes_answer_as_before(
+    scene: LiftedScene, tmp_path: Path, make_color_encoder
+) -> None:
     scene.save(tmp_path / "scene.npz")
-    again = LiftedScene.load(tmp_path / "scene.npz", TextScorer(ColorEncoder()))
+    again = LiftedScene.load(tmp_path / "scene.npz", TextScorer(make_color_encoder()))
     for text in ("red", "put the green box on the blue cylinder"):
         first, second = scene.query(text), again.query(text)
         assert first.cloud.similarity.tobytes() == second.cloud.similarity.tobytes()
@@ -126,8 +100,8 @@ def test_saved_scenes_answer_as_before(scene: LiftedScene, tmp_path: Path) -> No
     assert FeatureCloud.load(tmp_path / "scene.npz").similarity.max() == 0
 
 
-def test_clouds_refuse_another_text_tower(scene: LiftedScene) -> None:
-    other = ColorEncoder()
+def test_clouds_refuse_another_text_tower(scene: LiftedScene, make_color_encoder) -> None:
+    other = make_color_encoder()
     other.name = "colour"
     with pytest.raises(InvalidCloudError) as caught:
         LiftedScene(cloud=scene.cloud, scorer=TextScorer(other))
@@ -259,9 +233,9 @@ def test_seen_and_hidden_points(table_views: tuple[CameraView, ...]) -> None:
 
 
 def test_order_of_views_does_not_matter(
-    scene: LiftedScene, table_views: tuple[CameraView, ...]
+    scene: LiftedScene, table_views: tuple[CameraView, ...], make_color_encoder
 ) -> None:
     turned = tuple(replace(view) for view in table_views[::-1])
     config = fit_config(turned, workspace=WORKSPACE)
-    again = MultiViewLifter(ColorEncoder(), config).lift(turned)
+    again = MultiViewLifter(make_color_encoder(), config).lift(turned)
     assert again.cloud.features.tobytes() == scene.cloud.features.tobytes()

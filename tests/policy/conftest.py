@@ -1,6 +1,7 @@
-"""Scenes made of plain arrays, shared by the policy tests."""
+"""Scenes made of plain arrays and small networks, shared by the policy tests."""
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -8,8 +9,14 @@ from jaxtyping import install_import_hook
 from scipy.spatial.transform import Rotation
 
 from policy.actions import ActionCandidates
-from policy.network.config import SRConfig, ablation_switches
+from policy.network.config import NetworkConfig, SRConfig, ablation_switches
 from policy.observation import Observation
+
+# What is imported here is imported before shapes are checked: the networks come in fixtures.
+if TYPE_CHECKING:
+    from policy.network.base import CandidateNetwork
+    from policy.network.batch import SRSample
+    from policy.network.loss import SRTargetBatch
 
 # Shapes in annotations are checked in the modules that compute. The containers and configurations
 # check themselves; their own messages are tested, which a type checker in front would hide.
@@ -43,7 +50,31 @@ CHANNELS = 16
 
 ObservationMaker = Callable[..., Observation]
 CandidatesMaker = Callable[..., ActionCandidates]
-ConfigMaker = Callable[..., SRConfig]
+ConfigMaker = Callable[..., Any]
+SampleMaker = Callable[[NetworkConfig], list["SRSample"]]
+TargetMaker = Callable[[list["SRSample"]], "SRTargetBatch"]
+NetworkMaker = Callable[[NetworkConfig], "CandidateNetwork"]
+
+# Switches of what the paper does not have.
+PAPER_ONLY = ("prior", "phrase", "side", "similarity", "candidate_bias", "mask_readout")
+SR_NETWORKS: list[tuple[str, dict[str, Any]]] = [
+    ("base", {}),
+    ("sr_a", {}),
+    ("sr", {}),
+    ("sr", {"sparsifier": "relu"}),
+    ("sr", {"sparsifier": "softmax"}),
+    ("sr", {"self_attention": "full"}),
+    ("sr", {"query_fourier": False, "num_encoder_layers": 0}),
+    ("sr", {"language_attention": "points"}),
+    ("base", {"mask_readout": True}),
+    ("sr", dict.fromkeys(PAPER_ONLY, False)),
+]
+BASELINES: list[tuple[str, dict[str, Any]]] = [
+    ("a2", {}),
+    ("a2", {"prior": False, "side": False, "local_heads": False, "num_layers": 2}),
+    ("vlg", {}),
+    ("vlg", {"prior": False, "side": False, "phrase": False, "local_heads": False}),
+]
 
 
 def _unit(rows: np.ndarray) -> np.ndarray:
@@ -91,9 +122,99 @@ def make_candidates() -> CandidatesMaker:
 
 @pytest.fixture
 def make_config() -> ConfigMaker:
-    def make(ablation: str = "sr", **changes: object) -> SRConfig:
+    """Makes small configurations: of SR and its ablations, or of the baselines a2 and vlg."""
+    from policy.baselines.a2 import A2Config
+    from policy.baselines.vlg import VLGConfig
+
+    baselines = {"a2": A2Config, "vlg": VLGConfig}
+
+    def make(kind: str = "sr", **changes: Any) -> NetworkConfig:
         small = {"feature_dim": CHANNELS, "width": 32, "num_heads": 4, "max_points": 64}
-        return SRConfig(**(small | ablation_switches(ablation) | changes))
+        if kind in baselines:
+            return baselines[kind](**(small | changes))
+        return SRConfig(**(small | ablation_switches(kind) | changes))
+
+    return make
+
+
+def _name(variant: tuple[str, dict[str, Any]]) -> str:
+    return "-".join([variant[0], *map(str, variant[1].values())])
+
+
+@pytest.fixture(params=SR_NETWORKS, ids=_name)
+def sr_config(request: pytest.FixtureRequest, make_config: ConfigMaker) -> SRConfig:
+    kind, changes = request.param
+    return make_config(kind, **changes)
+
+
+@pytest.fixture(params=BASELINES, ids=_name)
+def baseline_config(request: pytest.FixtureRequest, make_config: ConfigMaker) -> Any:
+    kind, changes = request.param
+    return make_config(kind, **changes)
+
+
+@pytest.fixture(params=[*SR_NETWORKS, *BASELINES], ids=_name)
+def any_config(request: pytest.FixtureRequest, make_config: ConfigMaker) -> Any:
+    kind, changes = request.param
+    return make_config(kind, **changes)
+
+
+@pytest.fixture
+def make_network() -> NetworkMaker:
+    """Makes networks away from the special values at the start, which would hide mistakes."""
+    import torch
+
+    from policy.network.kinds import make_network
+
+    def make(config: NetworkConfig) -> "CandidateNetwork":
+        torch.manual_seed(0)
+        network = make_network(config)
+        with torch.no_grad():
+            for parameter in network.parameters():
+                parameter.add_(torch.randn_like(parameter) * 0.05)
+        return network.eval()
+
+    return make
+
+
+@pytest.fixture
+def make_samples(
+    rng: np.random.Generator, make_observation: ObservationMaker, make_candidates: CandidatesMaker
+) -> SampleMaker:
+    """Makes three decisions of different sizes, two picks and a place."""
+    from policy.network.batch import make_sample
+
+    def make(config: NetworkConfig) -> list["SRSample"]:
+        sizes = [(40, 5, 7, "pick"), (23, 2, 3, "place"), (64, 8, 1, "pick")]
+        return [
+            make_sample(
+                make_observation(rng, num_points, num_tokens, phrase_pooled=rng.normal(size=16)),
+                make_candidates(rng, num_candidates, kind),
+                config,
+            )
+            for num_points, num_tokens, num_candidates, kind in sizes
+        ]
+
+    return make
+
+
+@pytest.fixture
+def make_targets(rng: np.random.Generator) -> TargetMaker:
+    """Makes what the network should have said of each decision."""
+    from policy.network.loss import SRTarget, collate_targets
+
+    def make(samples: list["SRSample"]) -> "SRTargetBatch":
+        targets = []
+        for num in (len(sample.poses) for sample in samples):
+            targets.append(
+                SRTarget(
+                    positive=np.arange(num) == rng.integers(num),
+                    opening_m=rng.uniform(0, 0.085, num),
+                    avoid_collision=rng.integers(0, 2, num),
+                    rotvec_tool=rng.normal(0, 0.05, (num, 3)),
+                )
+            )
+        return collate_targets(targets)
 
     return make
 

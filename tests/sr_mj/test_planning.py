@@ -2,7 +2,6 @@ import itertools
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from models.tabletop import BIN_CENTER
 from models.ur5 import HOME_QPOS
@@ -17,6 +16,28 @@ def planner():
     return Planner()
 
 
+@pytest.fixture(scope="module")
+def near(pose_down):
+    """A grasp within reach."""
+    return pose_down(0.5, 0.1, 0.05, 0.4)
+
+
+@pytest.fixture(scope="module")
+def far(pose_down):
+    return pose_down(1.6, 0, 0.1)
+
+
+@pytest.fixture(scope="module")
+def cage(block):
+    """Stands between home and the grasp; the direct way leads through it."""
+    walls = [
+        ((0.40, -0.02, 0.01), (0.60, -0.01, 0.35)),
+        ((0.40, 0.21, 0.01), (0.60, 0.22, 0.35)),
+        ((0.61, -0.02, 0.01), (0.62, 0.22, 0.35)),
+    ]
+    return np.concatenate([block(*wall) for wall in walls])
+
+
 def candidates(*poses, width_m=0.05):
     num = len(poses)
     return ActionCandidates(
@@ -25,19 +46,6 @@ def candidates(*poses, width_m=0.05):
         width_m=np.full(num, width_m, np.float32),
         prior=np.ones(num, np.float32),
     )
-
-
-def pose_down(x, y, z, yaw=0.0):
-    pose = np.eye(4)
-    pose[:3, :3] = (Rotation.from_euler("z", yaw) * Rotation.from_euler("x", np.pi)).as_matrix()
-    pose[:3, 3] = x, y, z
-    return pose
-
-
-def block(low, high, step=0.006):
-    """Points that fill a box."""
-    axes = [np.arange(a, b, step) for a, b in zip(low, high, strict=True)]
-    return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 3).astype(np.float32)
 
 
 def by_phase(plan):
@@ -58,20 +66,11 @@ def nearest_point_m(planner, trajectory, points):
     return min(gaps.min(), boxes.min())
 
 
-REACHABLE, FAR = pose_down(0.5, 0.1, 0.05, 0.4), pose_down(1.6, 0, 0.1)
 FIRST = np.array([0])
-# Stands between home and the grasp; the direct way leads through it.
-CAGE = np.concatenate(
-    [
-        block((0.40, -0.02, 0.01), (0.60, -0.01, 0.35)),
-        block((0.40, 0.21, 0.01), (0.60, 0.22, 0.35)),
-        block((0.61, -0.02, 0.01), (0.62, 0.22, 0.35)),
-    ]
-)
 
 
-def test_phases_follow_each_other_without_a_jump(planner):
-    plan = planner.plan(candidates(REACHABLE), FIRST)
+def test_phases_follow_each_other_without_a_jump(planner, near):
+    plan = planner.plan(candidates(near), FIRST)
     assert plan.kind == "pick"
     assert tuple(segment.phase for segment in plan.segments) == PICK_PHASES
     moves = [s.trajectory for s in plan.segments if s.trajectory is not None]
@@ -81,8 +80,8 @@ def test_phases_follow_each_other_without_a_jump(planner):
         np.testing.assert_allclose(before.end, after.start, atol=1e-12)
 
 
-def test_approach_is_straight_and_lift_is_vertical(planner):
-    moves = by_phase(planner.plan(candidates(REACHABLE), FIRST))
+def test_approach_is_straight_and_lift_is_vertical(planner, near):
+    moves = by_phase(planner.plan(candidates(near), FIRST))
 
     def positions(phase):
         path = moves[phase].path(np.linspace(0, 1, 60))
@@ -92,27 +91,27 @@ def test_approach_is_straight_and_lift_is_vertical(planner):
     for path in (approach, lift):
         np.testing.assert_allclose(path[:, :2], np.tile([0.5, 0.1], (60, 1)), atol=2e-3)
     assert approach[0, 2] == pytest.approx(0.05 + planner.config.approach_m, abs=1e-3)
-    np.testing.assert_allclose(approach[-1], REACHABLE[:3, 3], atol=1e-3)
+    np.testing.assert_allclose(approach[-1], near[:3, 3], atol=1e-3)
     assert lift[-1, 2] == pytest.approx(0.05 + planner.config.lift_m, abs=1e-3)
 
 
-def test_goes_high_when_nobody_knows_what_stands_on_the_table(planner):
-    transit = by_phase(planner.plan(candidates(REACHABLE), FIRST))[Phase.TRANSIT]
+def test_goes_high_when_nobody_knows_what_stands_on_the_table(planner, near):
+    transit = by_phase(planner.plan(candidates(near), FIRST))[Phase.TRANSIT]
     path = np.array(
         [planner.kinematics.tool_pose(q)[:3, 3] for q in transit.path(np.linspace(0, 1, 200))]
     )
-    aside = np.linalg.norm(path[:, :2] - REACHABLE[:2, 3], axis=1) > 0.05
+    aside = np.linalg.norm(path[:, :2] - near[:2, 3], axis=1) > 0.05
     assert path[aside, 2].min() > planner.config.transit_height_m - 0.04
 
 
-def test_releases_over_the_bin(planner):
-    carry = by_phase(planner.plan(candidates(REACHABLE), FIRST))[Phase.CARRY]
+def test_releases_over_the_bin(planner, near):
+    carry = by_phase(planner.plan(candidates(near), FIRST))[Phase.CARRY]
     position = planner.kinematics.tool_pose(carry.end)[:3, 3]
     np.testing.assert_allclose(position[:2], BIN_CENTER[:2], atol=1e-3)
 
 
-def test_every_motion_keeps_the_limits(planner):
-    plan = planner.plan(candidates(REACHABLE), FIRST)
+def test_every_motion_keeps_the_limits(planner, near):
+    plan = planner.plan(candidates(near), FIRST)
     for trajectory in filter(None, by_phase(plan).values()):
         times = np.linspace(0, trajectory.duration_s, 2000)
         _, qvel = trajectory.sample(times)
@@ -122,23 +121,23 @@ def test_every_motion_keeps_the_limits(planner):
 
 
 @pytest.mark.parametrize(("width_m", "opening"), [(0.03, 0.05), (0.08, 0.085)])
-def test_opens_wider_than_the_contact_up_to_the_stroke(planner, width_m, opening):
-    plan = planner.plan(candidates(REACHABLE, width_m=width_m), FIRST)
+def test_opens_wider_than_the_contact_up_to_the_stroke(planner, width_m, opening, near):
+    plan = planner.plan(candidates(near, width_m=width_m), FIRST)
     assert plan.segments[0].width_m == pytest.approx(opening, abs=1e-6)
 
 
-def test_takes_the_first_candidate_that_can_be_reached(planner):
-    plan = planner.plan(candidates(FAR, REACHABLE, REACHABLE), np.array([0, 2, 1]))
+def test_takes_the_first_candidate_that_can_be_reached(planner, near, far):
+    plan = planner.plan(candidates(far, near, near), np.array([0, 2, 1]))
     assert plan.chosen == 2
 
 
-def test_nothing_reachable_is_no_plan(planner):
-    assert planner.plan(candidates(FAR), FIRST) is None
+def test_nothing_reachable_is_no_plan(planner, far, pose_down):
+    assert planner.plan(candidates(far), FIRST) is None
     assert planner.plan(candidates(), np.array([], int)) is None
     assert planner.plan(candidates(pose_down(0.5, 0, -0.03)), FIRST) is None
 
 
-def test_verdict_of_a_batch_is_that_of_each_plan(planner):
+def test_verdict_of_a_batch_is_that_of_each_plan(planner, pose_down):
     rng = np.random.default_rng(3)
     poses = [pose_down(*rng.uniform([0.2, -0.4, 0.0], [1.0, 0.4, 0.1]), rng.uniform(0, 3))
              for _ in range(60)]  # fmt: skip
@@ -149,51 +148,51 @@ def test_verdict_of_a_batch_is_that_of_each_plan(planner):
     assert planner.reachable(candidates()).shape == (0,)
 
 
-def test_every_vertical_grasp_in_the_workspace_is_reachable(planner):
+def test_every_vertical_grasp_in_the_workspace_is_reachable(planner, pose_down):
     grid = itertools.product(
         np.linspace(0.29, 0.71, 4), np.linspace(-0.21, 0.21, 4), [0.03], np.radians([0, 45, 90])
     )
     assert planner.reachable(candidates(*(pose_down(*place) for place in grid))).all()
 
 
-def test_links_that_would_sink_into_the_cloud_are_unreachable(planner):
+def test_links_that_would_sink_into_the_cloud_are_unreachable(planner, near, block):
     wall = block((0.3, -0.2, 0.3), (0.6, 0.2, 0.5), 0.01)
-    grasps = candidates(REACHABLE)
+    grasps = candidates(near)
     assert planner.reachable(grasps)[0]
     assert not planner.reachable(grasps, obstacles=wall)[0]
 
 
-def test_free_table_needs_no_search_and_no_detour(planner):
+def test_free_table_needs_no_search_and_no_detour(planner, near, block):
     cloud = block((0.3, -0.2, 0.01), (0.36, -0.14, 0.05))
-    plan = planner.plan(candidates(REACHABLE), FIRST, obstacles=cloud)
+    plan = planner.plan(candidates(near), FIRST, obstacles=cloud)
     assert plan.searched == ()
-    low, high = by_phase(plan), by_phase(planner.plan(candidates(REACHABLE), FIRST))
+    low, high = by_phase(plan), by_phase(planner.plan(candidates(near), FIRST))
     assert low[Phase.TRANSIT].duration_s < high[Phase.TRANSIT].duration_s
 
 
-def test_searches_a_way_around_what_bars_all_others(planner):
-    plan = planner.plan(candidates(REACHABLE), FIRST, obstacles=CAGE)
+def test_searches_a_way_around_what_bars_all_others(planner, near, cage):
+    plan = planner.plan(candidates(near), FIRST, obstacles=cage)
     assert plan.searched
     for phase, trajectory in by_phase(plan).items():
         if trajectory is not None:
-            assert nearest_point_m(planner, trajectory, CAGE[::3]) > 0, phase
+            assert nearest_point_m(planner, trajectory, cage[::3]) > 0, phase
 
 
-def test_the_same_question_gets_the_same_searched_path(planner):
-    first, second = (planner.plan(candidates(REACHABLE), FIRST, obstacles=CAGE) for _ in range(2))
+def test_the_same_question_gets_the_same_searched_path(planner, near, cage):
+    first, second = (planner.plan(candidates(near), FIRST, obstacles=cage) for _ in range(2))
     for a, b in zip(first.segments, second.segments, strict=True):
         if a.trajectory is not None:
             np.testing.assert_array_equal(a.trajectory.path.c, b.trajectory.path.c)
 
 
-def test_what_the_fingers_close_on_is_no_obstacle(planner):
+def test_what_the_fingers_close_on_is_no_obstacle(planner, near, block):
     between = block((0.49, 0.09, 0.01), (0.51, 0.11, 0.06))
-    assert planner.plan(candidates(REACHABLE), FIRST, obstacles=between) is not None
+    assert planner.plan(candidates(near), FIRST, obstacles=between) is not None
 
 
-def test_what_the_palm_would_hit_is_an_obstacle(planner):
+def test_what_the_palm_would_hit_is_an_obstacle(planner, near, block):
     tall = block((0.47, 0.07, 0.01), (0.53, 0.13, 0.2))
-    assert planner.plan(candidates(REACHABLE), FIRST, obstacles=tall) is None
+    assert planner.plan(candidates(near), FIRST, obstacles=tall) is None
 
 
 def test_points_of_the_table_are_no_obstacle(planner):
@@ -236,10 +235,10 @@ def test_a_link_sphere_stands_where_mujoco_puts_the_link():
     assert behind @ placed.rotation[0, :, 2] < -0.145
 
 
-def test_straight_poses_are_evenly_spaced():
+def test_straight_poses_are_evenly_spaced(near, pose_down):
     end = pose_down(0.5, 0.1, 0.15, 1.0)
-    poses = straight_poses(REACHABLE, end, 0.01)
-    np.testing.assert_allclose(poses[0], REACHABLE, atol=1e-12)
+    poses = straight_poses(near, end, 0.01)
+    np.testing.assert_allclose(poses[0], near, atol=1e-12)
     np.testing.assert_allclose(poses[-1], end, atol=1e-12)
     gaps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     assert gaps.max() <= 0.01 + 1e-9

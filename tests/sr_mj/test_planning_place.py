@@ -13,29 +13,6 @@ from sr_mj.planning.body import RobotBody
 from sr_mj.planning.clearance import Clearance
 
 
-def pose_down(x, y, z, yaw=0.0):
-    pose = np.eye(4)
-    pose[:3, :3] = (Rotation.from_euler("z", yaw) * Rotation.from_euler("x", np.pi)).as_matrix()
-    pose[:3, 3] = x, y, z
-    return pose
-
-
-def block(low, high, step=0.006):
-    axes = [np.arange(a, b, step) for a, b in zip(low, high, strict=True)]
-    return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 3).astype(np.float32)
-
-
-def held_box(length_m=0.06, half_m=0.02):
-    """A box that hangs below the tool, grasped at its top."""
-    low, high = (-half_m, -half_m, -0.01), (half_m, half_m, length_m)
-    return HeldObject(
-        points_tool=block(low, high),
-        drop_m=length_m,
-        T_world_tool=pose_down(0.4, 0.0, length_m),
-        width_m=2 * half_m,
-    )
-
-
 def places(*poses, width_m=0.04):
     num = len(poses)
     return ActionCandidates(
@@ -47,8 +24,33 @@ def places(*poses, width_m=0.04):
 
 
 FIRST = np.array([0])
-HELD = held_box()
-PLACE = pose_down(0.5, 0.05, 0.065, 0.7)
+
+
+@pytest.fixture(scope="module")
+def held_box(block, pose_down):
+    """Makes boxes that hang below the tool, grasped at their top."""
+
+    def make(length_m=0.06, half_m=0.02):
+        low, high = (-half_m, -half_m, -0.01), (half_m, half_m, length_m)
+        return HeldObject(
+            points_tool=block(low, high),
+            drop_m=length_m,
+            T_world_tool=pose_down(0.4, 0.0, length_m),
+            width_m=2 * half_m,
+        )
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def box(held_box):
+    return held_box()
+
+
+@pytest.fixture(scope="module")
+def goal(pose_down):
+    """Where to let go of the box, which then stands 5 mm over the table."""
+    return pose_down(0.5, 0.05, 0.065, 0.7)
 
 
 @pytest.fixture(scope="module")
@@ -62,10 +64,10 @@ def start(planner):
     return planner.postures_over_bin[0]
 
 
-def test_phases_follow_each_other_from_the_start_to_home(planner, start):
-    plan = planner.plan(places(PLACE), FIRST, held=HELD, start=start)
+def test_phases_follow_each_other_from_the_start_to_home(planner, start, box, goal):
+    plan = planner.plan(places(goal), FIRST, held=box, start=start)
     assert plan.kind == "place" and plan.chosen == 0
-    np.testing.assert_array_equal(plan.T_world_tool, PLACE)
+    np.testing.assert_array_equal(plan.T_world_tool, goal)
     assert tuple(segment.phase for segment in plan.segments) == PLACE_PHASES
     moves = [s.trajectory for s in plan.segments if s.trajectory is not None]
     np.testing.assert_allclose(moves[0].start, start)
@@ -75,67 +77,66 @@ def test_phases_follow_each_other_from_the_start_to_home(planner, start):
         np.testing.assert_allclose(before.end, after.start, atol=1e-12)
 
 
-def test_holds_on_until_the_place_and_opens_a_little_there(planner, start):
-    plan = planner.plan(places(PLACE), FIRST, held=HELD, start=start)
+def test_holds_on_until_the_place_and_opens_a_little_there(planner, start, box, goal):
+    plan = planner.plan(places(goal), FIRST, held=box, start=start)
     widths = {segment.phase: segment.width_m for segment in plan.segments}
     assert widths[Phase.TRANSIT] == widths[Phase.LOWER] == 0
-    assert widths[Phase.RELEASE] == pytest.approx(HELD.width_m + planner.config.extra_width_m)
+    assert widths[Phase.RELEASE] == pytest.approx(box.width_m + planner.config.extra_width_m)
 
 
-def test_lowers_straight_down_to_the_very_pose(planner, start):
-    plan = planner.plan(places(PLACE), FIRST, held=HELD, start=start)
+def test_lowers_straight_down_to_the_very_pose(planner, start, box, goal):
+    plan = planner.plan(places(goal), FIRST, held=box, start=start)
     lower = next(s.trajectory for s in plan.segments if s.phase is Phase.LOWER)
     poses = np.array([planner.kinematics.tool_pose(q) for q in lower.path(np.linspace(0, 1, 50))])
-    np.testing.assert_allclose(poses[-1], PLACE, atol=3e-3)
+    np.testing.assert_allclose(poses[-1], goal, atol=3e-3)
     # Not turned by half a turn either: the object would lie the other way round.
-    np.testing.assert_allclose(poses[:, :3, :3], np.tile(PLACE[:3, :3], (50, 1, 1)), atol=5e-3)
-    np.testing.assert_allclose(poses[:, :2, 3], np.tile(PLACE[:2, 3], (50, 1)), atol=2e-3)
+    np.testing.assert_allclose(poses[:, :3, :3], np.tile(goal[:3, :3], (50, 1, 1)), atol=5e-3)
+    np.testing.assert_allclose(poses[:, :2, 3], np.tile(goal[:2, 3], (50, 1)), atol=2e-3)
     assert np.all(np.diff(poses[:, 2, 3]) < 1e-4)
 
 
-def test_retreats_back_along_a_tilted_tool(planner, start):
-    tilted = PLACE.copy()
-    tilted[:3, :3] = PLACE[:3, :3] @ Rotation.from_euler("x", -0.5).as_matrix()
-    plan = planner.plan(places(tilted), FIRST, held=HELD, start=start)
+def test_retreats_back_along_a_tilted_tool(planner, start, box, goal):
+    tilted = goal.copy()
+    tilted[:3, :3] = goal[:3, :3] @ Rotation.from_euler("x", -0.5).as_matrix()
+    plan = planner.plan(places(tilted), FIRST, held=box, start=start)
     retreat = next(s.trajectory for s in plan.segments if s.phase is Phase.RETREAT)
     ends = [planner.kinematics.tool_pose(q)[:3, 3] for q in (retreat.start, retreat.end)]
     expected = -planner.config.approach_m * tilted[:3, 2]
     np.testing.assert_allclose(ends[1] - ends[0], expected, atol=2e-3)
 
 
-def test_a_held_object_counts_on_the_way_down(planner, start):
+def test_a_held_object_counts_on_the_way_down(planner, start, box, goal, block):
     # Beside the gripper, but where the held box would come down; lower than where it may touch.
     neighbour = block((0.495, 0.045, 0.01), (0.505, 0.055, 0.05))
-    wide = held_box()
-    assert planner.plan(places(PLACE), FIRST, obstacles=neighbour, start=start) is not None
-    assert planner.plan(places(PLACE), FIRST, obstacles=neighbour, held=wide, start=start) is None
+    assert planner.plan(places(goal), FIRST, obstacles=neighbour, start=start) is not None
+    assert planner.plan(places(goal), FIRST, obstacles=neighbour, held=box, start=start) is None
 
 
-def test_a_held_object_may_touch_what_it_is_put_on(planner, start):
+def test_a_held_object_may_touch_what_it_is_put_on(planner, start, box, goal, block):
     support = block((0.44, -0.01, 0.01), (0.56, 0.11, 0.03))
-    on_top = PLACE.copy()
-    on_top[2, 3] = 0.03 + HELD.drop_m + 0.003
-    plan = planner.plan(places(on_top), FIRST, obstacles=support, held=HELD, start=start)
+    on_top = goal.copy()
+    on_top[2, 3] = 0.03 + box.drop_m + 0.003
+    plan = planner.plan(places(on_top), FIRST, obstacles=support, held=box, start=start)
     assert plan is not None
-    too_low = PLACE.copy()
-    too_low[2, 3] = 0.03 + HELD.drop_m - 0.03
-    assert planner.plan(places(too_low), FIRST, obstacles=support, held=HELD, start=start) is None
+    too_low = goal.copy()
+    too_low[2, 3] = 0.03 + box.drop_m - 0.03
+    assert planner.plan(places(too_low), FIRST, obstacles=support, held=box, start=start) is None
 
 
-def test_a_held_object_does_not_sink_into_the_table(planner, start):
+def test_a_held_object_does_not_sink_into_the_table(planner, start, box, pose_down):
     sunk = pose_down(0.5, 0.05, 0.03)
-    assert planner.plan(places(sunk), FIRST, held=HELD, start=start) is None
+    assert planner.plan(places(sunk), FIRST, held=box, start=start) is None
 
 
-def test_goes_on_to_the_next_place(planner, start):
+def test_goes_on_to_the_next_place(planner, start, box, goal, pose_down):
     far = pose_down(1.4, 0, 0.1)
     sunk = pose_down(0.5, 0.05, 0.03)
-    plan = planner.plan(places(far, sunk, PLACE), np.array([1, 0, 2]), held=HELD, start=start)
+    plan = planner.plan(places(far, sunk, goal), np.array([1, 0, 2]), held=box, start=start)
     assert plan.chosen == 2
-    np.testing.assert_array_equal(planner.reachable(places(far, PLACE)), [False, True])
+    np.testing.assert_array_equal(planner.reachable(places(far, goal)), [False, True])
 
 
-def test_the_transit_keeps_the_held_object_clear(planner, start):
+def test_the_transit_keeps_the_held_object_clear(planner, start, pose_down, block, held_box):
     wall = block((0.3, -0.2, 0.01), (0.75, -0.185, 0.24))
     long = held_box(length_m=0.15)
     place = pose_down(0.5, 0.05, 0.155)
@@ -162,7 +163,7 @@ def test_a_held_object_keeps_clear_of_the_arm(planner, start):
     assert touching[0] == pytest.approx(-body.radius_m[body.is_far][20] - 0.006, abs=2e-3)
 
 
-def test_a_long_object_is_lifted_over_the_wall_of_the_bin(planner, start):
+def test_a_long_object_is_lifted_over_the_wall_of_the_bin(planner, start, pose_down, held_box):
     long = held_box(length_m=0.235)
     plan = planner.plan(places(pose_down(0.5, 0.05, 0.24)), FIRST, held=long, start=start)
     transit = next(s.trajectory for s in plan.segments if s.phase is Phase.TRANSIT)

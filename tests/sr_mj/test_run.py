@@ -193,6 +193,7 @@ CASE = "give me the pear\n0\nassets/015.urdf 0.5 0 0.2 0 0 0\n"
         ("run", ["--seed", "-3"], "Seed is -3; expected an integer of 0 or more."),
         ("run", ["--attempts", "0"], "Attempts is 0; expected 1 to 100."),
         ("run", ["--goal", ""], "The goal is blank; say what to grasp, or leave the goal out."),
+        ("run", ["--scene", "empty"], "The scene 'empty' has no objects from which to draw a goal; state one with --goal, or choose another scene, such as 'single'."),
         ("run", ["--record", "film.avi"], "Cannot record to 'film.avi': the name ends in '.avi', expected one of .mp4, .gif."),
         ("run", ["--record", "no/film.mp4"], "Cannot record to 'no/film.mp4': create its folder first."),
         ("run", ["--scene", "place8", "--goal", "put it near the bowl"], "The goal 'put it near the bowl' does not say what to pick; say it first, as in 'give me the apple, put it near the bowl', or choose a place arrangement."),

@@ -29,6 +29,13 @@ def test_a_row_that_was_cut_off(tmp_path: Path) -> None:
     assert [row["step"] for row in read_table(path)] == [1, 2, 3, 4]
 
 
+def test_without_a_saved_state_nothing_stays(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    for _ in range(2):
+        _write(path, range(0, 3), last_step=-1)
+        assert [row["step"] for row in read_table(path)] == [0, 1, 2]
+
+
 def test_no_table() -> None:
     assert read_table(Path("nowhere.csv")) == []
 

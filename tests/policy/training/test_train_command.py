@@ -103,6 +103,22 @@ def test_a_killed_run_goes_on_and_is_drawn(
         assert image.width > image.height > 500
 
 
+def test_a_run_killed_before_its_first_saved_state_begins_anew(
+    scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "run"
+    arguments = ("--data", scenes, "--out", out, *OPTIONS, "--epochs", "1")
+    assert _main(monkeypatch, *arguments) == 0
+    whole = {name: read_table(out / name) for name in ("steps.csv", "epochs.csv")}
+    # As the kill would have left it: logs, but no state.
+    (out / "state.safetensors").unlink()
+    assert _main(monkeypatch, *arguments, "--resume") == 0
+    for name, rows in whole.items():
+        again = read_table(out / name)
+        assert [row["step"] for row in again] == [row["step"] for row in rows]
+    assert [row["epoch"] for row in read_table(out / "epochs.csv")] == [0, 1]
+
+
 def _interrupting(name: str):
     """The real function, after whose first call the process gets SIGTERM."""
     module, _, attribute = name.rpartition(".")
