@@ -68,7 +68,8 @@ def run(config: TrainConfig) -> int:
             return 0
         config.out.mkdir(parents=True, exist_ok=True)
         _describe(trainer)
-        last_step = trainer.progress.step
+        # Without a saved state, the row of the untrained network is made again too.
+        last_step = trainer.progress.step or -1
         with RunLog(config.out, last_step=last_step, tensorboard=config.tensorboard) as log:
             is_complete = trainer.run(log, stop)
     progress = trainer.progress

@@ -206,23 +206,30 @@ def _run_missing(
     """Run what the folder does not have yet, and tell what ended in an exception."""
     from tqdm import tqdm
 
+    from sr_mj.evaluation.identity import Identity
     from sr_mj.evaluation.pool import run_episodes
-    from sr_mj.evaluation.setting import Identity
     from sr_mj.provenance import to_json
 
     start, identity = time.perf_counter(), Identity(setting)
-    for episode in episodes:
-        if episode in folder.lines:
-            identity.check(episode, folder.lines[episode])
+    # Every line, planned now or not: all of them end in the same rows of the report.
+    for episode, record in folder.lines.items():
+        identity.check(episode, record)
     if config.retry_errors:
         folder.drop([e for e in episodes if folder.lines.get(e, {}).get("error")])
     about = {"config": config, "git_revision": setting.revision, "versions": setting.versions}
     (folder.path / "run.json").write_text(to_json(about))
     missing = [episode for episode in episodes if episode not in folder.lines]
+    lost: list[str] = []
     with closing(run_episodes(missing, setting, workers=config.workers, ray=config.ray)) as running:
         for done in tqdm(running, desc="episodes", total=len(missing)):
             folder.add(done)
+            lost += [] if done.lost_pictures is None else [done.lost_pictures]
     folder.finish()
+    if lost:
+        print(
+            f"Pictures of {len(lost)} episodes could not be kept ({lost[0]}); their results are.",
+            file=sys.stderr,
+        )
     num_errors = sum(line["error"] is not None for line in folder.lines.values())
     if num_errors:
         print(

@@ -21,7 +21,7 @@ class CsvLog:
         Args:
             path: The file; rows that it has stay, unless they are of later steps, which a run that
                 was interrupted has to make again.
-            last_step: Last step made.
+            last_step: Last step made; -1 if not even the untrained network's row is to stay.
         """
         rows = [row for row in read_table(path) if row["step"] <= last_step]
         part = path.with_name(f".{path.name}.{os.getpid()}.tmp")
@@ -79,7 +79,7 @@ class RunLog:
 
         Args:
             out: Folder of the run.
-            last_step: Last step made; what was logged later is dropped.
+            last_step: Last step made; what was logged later is dropped. -1 drops all.
             tensorboard: Write event files too.
         """
         self._steps = CsvLog(out / STEPS_FILE, last_step=last_step)

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
+from sr_mj.evaluation.identity import Identity
 from sr_mj.evaluation.plan import Episode
-from sr_mj.evaluation.setting import Identity, Setting
+from sr_mj.evaluation.setting import Setting
 
 # What the account of an episode calls these is told by the episode itself, or by its identity.
 _TOLD_ELSEWHERE = ("scene", "arrangement", "split", "seed", "max_attempts", "success")
@@ -19,12 +20,14 @@ class Done:
         record: Its line of results: no times, so that the same episode gives the same line.
         seconds: Wall time of the whole episode ("total") and of every stage.
         traceback: Of the exception that ended it, if one did.
+        lost_pictures: Why its pictures could not be kept, if they should have been.
     """
 
     episode: Episode
     record: dict[str, Any]
     seconds: dict[str, float]
     traceback: str | None = None
+    lost_pictures: str | None = None
 
 
 def result_line(

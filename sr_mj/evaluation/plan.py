@@ -97,7 +97,8 @@ def read_policies(texts: Iterable[str]) -> tuple[PolicyChoice, ...]:
 
     Raises:
         UnknownNameError: If there is no such policy.
-        ConfigError: If a file is missing, or two policies would be called the same.
+        ConfigError: If a file is missing or given to a reference, or two policies would be called
+            the same.
     """
     choices: dict[str, PolicyChoice] = {}
     for text in (*REFERENCES, *texts):
@@ -117,6 +118,11 @@ def _read_policy(text: str) -> PolicyChoice:
     check_policy_name(name)
     if not checkpoint:
         return PolicyChoice(label=name, name=name)
+    if name in REFERENCES:
+        raise ConfigError(
+            f"Policy {name!r} is given the checkpoint {checkpoint!r}, but has no weights; leave "
+            "the checkpoint out, or name the policy that it belongs to."
+        )
     path = Path(checkpoint)
     if not path.is_file():
         raise ConfigError(f"Checkpoint {checkpoint!r} of policy {name!r} is no file; check it.")
@@ -141,22 +147,21 @@ def plan_suites(
         seeds: One run each.
         policies: Every one of them runs every scene with every seed.
         conditions: Instead of the suites' own.
-        only: Names of arrangements to restrict the suites to.
+        only: Names of arrangements to restrict the suites to; each must be in one of them.
 
     Returns:
         The episodes in canonical order, each once, though suites share some.
 
     Raises:
         UnknownNameError: If a suite or an arrangement does not exist.
-        ConfigError: If a condition does not exist, or nothing is left to run.
+        ConfigError: If a condition does not exist, an arrangement is not in these suites, or
+            nothing is left to run.
     """
-    for name in only:
-        if name not in arrangement_names():
-            raise UnknownNameError(unknown_name_message("arrangement", name, arrangement_names()))
-    runs = tuple(seeds)
+    tasks_and_conditions, runs = _tasks_and_conditions(suites, conditions), tuple(seeds)
+    _check_arrangements(only, suites, splits, {task for task, _ in tasks_and_conditions})
     planned = {
         Episode(task=t, split=p, scene=name, condition=c, seed=seed, policy=policy.label)
-        for t, c in _tasks_and_conditions(suites, conditions)
+        for t, c in tasks_and_conditions
         for p in splits
         for name in arrangement_names(t, p)
         if not only or name in only
@@ -165,10 +170,26 @@ def plan_suites(
     }
     if not planned:
         raise ConfigError(
-            f"Nothing to run: no arrangement of the suites {', '.join(suites)} is left with split "
-            f"{' and '.join(splits)}, {len(runs)} seeds and {', '.join(only) or 'no restriction'}."
+            f"Nothing to run in the suites {', '.join(suites)}: got {len(runs)} seeds and "
+            f"{len(policies)} policies, expected at least one of each."
         )
     return tuple(sorted(planned))
+
+
+def _check_arrangements(
+    only: Sequence[str], suites: Sequence[str], splits: Sequence[str], tasks: Iterable[str]
+) -> None:
+    """Refuse names that do not exist, or that would be left out without a word."""
+    known = arrangement_names()
+    there = {name for task in tasks for split in splits for name in arrangement_names(task, split)}
+    for name in only:
+        if name not in known:
+            raise UnknownNameError(unknown_name_message("arrangement", name, known))
+        if name not in there:
+            raise ConfigError(
+                f"Arrangement {name!r} is in none of the suites {', '.join(suites)} with split "
+                f"{' and '.join(splits)}; add its suite and split, or leave it out."
+            )
 
 
 def _tasks_and_conditions(

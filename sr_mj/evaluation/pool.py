@@ -6,9 +6,10 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from functools import partial
 
+from sr_mj.evaluation.identity import Identity
 from sr_mj.evaluation.lines import Done, result_line
 from sr_mj.evaluation.plan import Episode
-from sr_mj.evaluation.setting import Identity, Setting
+from sr_mj.evaluation.setting import Setting
 from sr_mj.parallel.processes import NUM_TRIES, run_in_processes
 
 RENEW_AFTER = 200

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from sr_mj.errors import ConfigError
+from sr_mj.evaluation.mixture import is_same_result, mixtures
 from sr_mj.evaluation.page import page
 from sr_mj.evaluation.paper import paper_tables
 from sr_mj.evaluation.plan import Episode
@@ -38,7 +38,8 @@ def merge_results(paths: Sequence[Path]) -> tuple[Lines, Seconds, tuple[Path, ..
         All lines, all times, and the folders where pictures may be.
 
     Raises:
-        ConfigError: If a path has no results, or two have different results of one episode.
+        ConfigError: If a path has no results, or two have different results of one episode. The
+            same result of other code or packages is no other; the first is taken.
     """
     lines: Lines = {}
     seconds: Seconds = {}
@@ -50,7 +51,7 @@ def merge_results(paths: Sequence[Path]) -> tuple[Lines, Seconds, tuple[Path, ..
                 "python -m sr_mj.eval wrote, or its episodes.jsonl.gz."
             )
         for episode, record in found.items():
-            if lines.setdefault(episode, record) != record:
+            if not is_same_result(lines.setdefault(episode, record), record):
                 raise ConfigError(
                     f"{str(path)!r} has another result of {episode.key} than the paths before it; "
                     "leave one of them out."
@@ -120,10 +121,12 @@ def _about(lines: Lines) -> list[str]:
         (("encoder", "encoder_fingerprint"), "Encoder"),
         (("revision",), "Code"),
     ):
-        found = dict.fromkeys(", ".join(f"{n} {r[n]}" for n in names) for r in records)
+        found = dict.fromkeys(
+            ", ".join(f"{n} {r.get(n, 'not known')}" for n in names) for r in records
+        )
         texts.append(f"{what}: {'; '.join(found)}.")
     packages = dict.fromkeys(
-        ", ".join(f"{name} {version}" for name, version in (r["versions"] or {}).items())
+        ", ".join(f"{name} {version}" for name, version in (r.get("versions") or {}).items())
         for r in records
     )
     texts.append(f"Packages: {'; '.join(packages)}.")
@@ -158,11 +161,4 @@ def warnings_about(lines: Lines) -> list[str]:
                 f"{group.task}, {group.split}, {group.condition}: the policies did not run the "
                 f"same episodes ({counts}); only paired differences compare like with like."
             )
-    for name, what in (("revision", "revisions of the code"), ("versions", "sets of packages")):
-        found: list[Any] = []
-        for record in records:
-            if record[name] not in found:
-                found.append(record[name])
-        if len(found) > 1:
-            notes.append(f"The episodes were run with {len(found)} {what}.")
-    return notes
+    return [*notes, *mixtures(lines)]

@@ -4,11 +4,12 @@ import fcntl
 import gzip
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Any
 
 from sr_mj.errors import ConfigError
+from sr_mj.evaluation.form import check_entry, check_line, check_times
 from sr_mj.evaluation.lines import Done
 from sr_mj.evaluation.plan import Episode
 
@@ -100,21 +101,25 @@ def read_lines(path: Path) -> tuple[Lines, dict[Episode, dict[str, float]]]:
             `*.jsonl.gz` of its lines.
 
     Returns:
-        Lines and times of every episode; a line cut short at the end of the journal is left out.
+        Lines and times of every episode; a line cut short at the end of a folder's journal is left
+        out, anywhere else it is an error.
 
     Raises:
-        ConfigError: If a file cannot be read.
+        ConfigError: If a file cannot be read, or holds something else.
     """
     lines: Lines = {}
     seconds: dict[Episode, dict[str, float]] = {}
     is_folder = path.is_dir()
-    for record in _read_file(path / LINES if is_folder else path, is_needed=not is_folder):
-        lines[Episode.of_record(record)] = record
-    for record in _read_file(path.parent / SECONDS if not is_folder else path / SECONDS):
-        seconds[Episode.of_record(record)] = record["seconds"]
-    if is_folder:
+    folder = path if is_folder else path.parent
+    if not is_folder or (path / LINES).exists():
+        for record in _read_file(path / LINES if is_folder else path, check_line):
+            lines[Episode.of_record(record)] = record
+    if (folder / SECONDS).exists():
+        for record in _read_file(folder / SECONDS, check_times):
+            seconds[Episode.of_record(record)] = record["seconds"]
+    if is_folder and (path / _JOURNAL).exists():
         # The journal comes last: it is newer than the files if both have an episode.
-        for entry in _read_file(path / _JOURNAL):
+        for entry in _read_file(path / _JOURNAL, check_entry, is_cut=True):
             episode = Episode.of_record(entry["record"])
             lines[episode], seconds[episode] = entry["record"], entry["seconds"]
     return lines, seconds
@@ -134,19 +139,30 @@ def snapshot_path(stem: Path, name: str) -> Path:
     return stem.with_name(f"{stem.name}-{name}.jpg")
 
 
-def _read_file(path: Path, *, is_needed: bool = False) -> list[dict[str, Any]]:
-    if not path.exists() and not is_needed:
-        return []
+def _read_file(
+    path: Path, check: Callable[[Any], None], *, is_cut: bool = False
+) -> list[dict[str, Any]]:
+    """Read a file of lines; whether what follows the last line break `is_cut`."""
     try:
         data = path.read_bytes()
-        text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode()
-        # What follows the last line break was cut short.
-        return [json.loads(line) for line in text.split("\n")[:-1]]
+        data = gzip.decompress(data) if path.suffix == ".gz" else data
+        # Before anything is decoded: the cut may go through a letter.
+        data = data[: data.rfind(b"\n") + 1] if is_cut else data
+        return [_read_line(n, line, check) for n, line in enumerate(data.splitlines(), start=1)]
     except (OSError, EOFError, ValueError) as error:
         raise ConfigError(
             f"Results {str(path)!r} cannot be read ({error}); give a folder that "
             "python -m sr_mj.eval wrote, or its episodes.jsonl.gz."
         ) from None
+
+
+def _read_line(number: int, line: bytes, check: Callable[[Any], None]) -> dict[str, Any]:
+    try:
+        value = json.loads(line)
+        check(value)
+    except ValueError as error:
+        raise ValueError(f"line {number}: {error}") from None
+    return value
 
 
 def _locked(path: Path) -> IO[bytes]:

@@ -1,15 +1,10 @@
-"""What all episodes of an evaluation share, and how a line of results proves that it does."""
+"""What all episodes of an evaluation share."""
 
-import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import policy
-from models.arrangements.arrangement import to_record
-from models.arrangements.library import load_arrangement
-from sr_mj.errors import ConfigError
 from sr_mj.evaluation.plan import Episode, PolicyChoice
 
 if TYPE_CHECKING:
@@ -46,8 +41,8 @@ class Setting:
         picture_seeds: Seeds whose episodes are pictured.
         versions: Of all packages that results depend on.
         revision: Of the code.
-        make_random_scene: Makes random scenes instead of `sr_mj.scene.make_scene`; a function of a
-            module, so that other processes find it.
+        scene_makers: By kind of random scene, what makes it instead of `sr_mj.scene.make_scene`: a
+            function of a module, so that other processes find it. Lines of results name it.
     """
 
     policies: tuple[PolicyChoice, ...]
@@ -63,7 +58,7 @@ class Setting:
     picture_seeds: tuple[int, ...] = ()
     versions: dict[str, str] | None = None
     revision: str | None = None
-    make_random_scene: SceneMaker | None = None
+    scene_makers: Mapping[str, SceneMaker] = field(default_factory=dict)
 
     def choice(self, label: str) -> PolicyChoice:
         """Return the policy with a label."""
@@ -72,20 +67,6 @@ class Setting:
     def encoder_for(self, label: str) -> str:
         """Return the encoder that a policy looks through."""
         return BLANK if self.choice(label).name in BLIND_POLICIES else self.encoder
-
-
-def weights_hash(choice: PolicyChoice) -> str | None:
-    """Hash the weights of a policy.
-
-    Args:
-        choice: The policy.
-
-    Returns:
-        SHA-256 of its checkpoint, or of the one shipped under its name; None if it has none.
-    """
-    shipped = Path(policy.__file__).parent / "weights" / f"{choice.name.replace('-', '_')}"
-    path = choice.checkpoint or shipped.with_suffix(".safetensors")
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
 
 
 def load_choice(choice: PolicyChoice, encoder_fingerprints: tuple[str, ...]) -> "Policy":
@@ -104,59 +85,3 @@ def load_choice(choice: PolicyChoice, encoder_fingerprints: tuple[str, ...]) -> 
     from policy.registry import load_policy
 
     return load_policy(choice.name, checkpoint=choice.checkpoint, encoder=encoder_fingerprints)
-
-
-class Identity:
-    """Says what an episode's result depends on; the same for equal inputs.
-
-    Args:
-        setting: What all episodes share.
-    """
-
-    def __init__(self, setting: Setting) -> None:
-        """Hash the policies' weights once."""
-        self._setting = setting
-        self._weights = {choice.label: weights_hash(choice) for choice in setting.policies}
-        self._arrangements: dict[str, str] = {}
-
-    def of(self, episode: Episode) -> dict[str, Any]:
-        """Return names, hashes and settings as plain JSON values."""
-        setting, choice = self._setting, self._setting.choice(episode.policy)
-        encoder = setting.encoder_for(episode.policy)
-        return {
-            "privileged": choice.name in PRIVILEGED_POLICIES,
-            "weights_sha256": self._weights[episode.policy],
-            "encoder": encoder,
-            "encoder_fingerprint": encoder if encoder == BLANK else setting.encoder_fingerprint,
-            "arrangement_sha256": self._arrangement(episode),
-            "generator": setting.generator,
-            "cameras": setting.cameras,
-            "max_attempts": setting.attempts,
-            "keep_unreachable": setting.keep_unreachable,
-        }
-
-    def check(self, episode: Episode, record: dict[str, Any]) -> None:
-        """Refuse an earlier result that was made with something else.
-
-        Args:
-            episode: What is to be run.
-            record: The earlier result of the same episode.
-
-        Raises:
-            ConfigError: If an entry differs.
-        """
-        for name, expected in self.of(episode).items():
-            if record.get(name) != expected:
-                raise ConfigError(
-                    f"The results to resume have {name} {record.get(name)!r} in episode "
-                    f"{episode.key}, this run has {expected!r}; use the same options and files, "
-                    "or a new --out."
-                )
-
-    def _arrangement(self, episode: Episode) -> str | None:
-        if not episode.is_arranged:
-            return None
-        name = episode.scene
-        if name not in self._arrangements:
-            self._arrangements[name] = to_record(load_arrangement(name))["sha256"]
-        return self._arrangements[name]

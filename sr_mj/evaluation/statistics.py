@@ -64,9 +64,10 @@ def paired_bootstrap(
     Args:
         groups: Differences of pairs (same scene, same seed), one group for each scene.
         rng: Source of the draws.
-        are_groups_drawn: Draw scenes with replacement, and pairs within each: what the difference
-            would be on other scenes. Otherwise the scenes are given and only pairs within each
-            are drawn: what it would be with other seeds.
+        are_groups_drawn: Draw scenes with replacement, and pairs within each, anew for every time
+            that a scene is drawn: what the difference would be on other scenes. With two or three
+            scenes the interval is too narrow to be trusted. Otherwise the scenes are given and only
+            pairs within each are drawn: what it would be with other seeds.
         num_draws: Bootstrap samples.
         level: Share of them inside the interval.
 
@@ -74,22 +75,37 @@ def paired_bootstrap(
         Mean over all pairs, and its interval.
 
     Raises:
-        ValueError: If there is no pair.
+        ValueError: If there is no pair, or if scenes are to be drawn from fewer than two.
     """
     kept = [np.asarray(group, float) for group in groups if len(group)]
     if not kept:
         raise ValueError("Got no pairs to compare; expected at least one.")
-    sizes = np.array([len(group) for group in kept])
-    totals = np.stack([_resampled_totals(group, rng, num_draws) for group in kept])
-    if are_groups_drawn:
-        drawn = rng.integers(len(kept), size=(len(kept), num_draws))
-        totals = np.take_along_axis(totals, drawn, axis=0)
-        means = totals.sum(axis=0) / sizes[drawn].sum(axis=0)
-    else:
-        means = totals.sum(axis=0) / sizes.sum()
+    if are_groups_drawn and len(kept) < 2:
+        raise ValueError("Got one scene to draw scenes from; expected at least two.")
+    means = (_means_elsewhere if are_groups_drawn else _means_here)(kept, rng, num_draws)
     low, high = np.quantile(means, [(1 - level) / 2, (1 + level) / 2])
     value = float(np.concatenate(kept).mean())
     return Interval(value=value, low=float(low), high=float(high))
+
+
+def _means_here(groups: list[np.ndarray], rng: np.random.Generator, num_draws: int) -> np.ndarray:
+    """Draw pairs in given groups; return the means (num_draws,)."""
+    totals = np.sum([_resampled_totals(group, rng, num_draws) for group in groups], axis=0)
+    return totals / sum(map(len, groups))
+
+
+def _means_elsewhere(
+    groups: list[np.ndarray], rng: np.random.Generator, num_draws: int
+) -> np.ndarray:
+    """Draw groups, and pairs in each; return the means (num_draws,)."""
+    drawn = rng.integers(len(groups), size=(num_draws, len(groups)))
+    totals = np.empty(drawn.shape)
+    for index, group in enumerate(groups):
+        # A group that is drawn twice stands for two others, whose pairs are not the same.
+        is_drawn = drawn == index
+        totals[is_drawn] = _resampled_totals(group, rng, int(is_drawn.sum()))
+    sizes = np.array([len(group) for group in groups])
+    return totals.sum(axis=1) / sizes[drawn].sum(axis=1)
 
 
 def _resampled_totals(group: np.ndarray, rng: np.random.Generator, num_draws: int) -> np.ndarray:

@@ -151,8 +151,10 @@ class Comparison:
         policy: Label.
         against: Label of the other.
         pairs: Episodes that both ran.
-        success: Difference of the success rates; interval for other seeds on these scenes.
-        success_elsewhere: The same, with an interval for other scenes too.
+        success: Difference of the success rates; interval for other seeds on these scenes, its ends
+            nan if every scene was run once, which tells nothing of other seeds.
+        success_elsewhere: The same, with an interval for other scenes too; None if there is only
+            one, which tells nothing of others.
         steps: Difference of the steps; interval for other seeds on these scenes.
         wins: Pairs in which only `policy` succeeded.
         losses: Pairs in which only `against` did.
@@ -162,7 +164,7 @@ class Comparison:
     against: str
     pairs: int
     success: Interval
-    success_elsewhere: Interval
+    success_elsewhere: Interval | None
     steps: Interval
     wins: int
     losses: int
@@ -214,20 +216,30 @@ def _compare_pairs(ours: str, other: str, pairs: Pairs) -> Comparison:
     success = [[float(a["success"]) - b["success"] for a, b in g] for g in pairs.values()]
     steps = [[float(a["num_actions"]) - b["num_actions"] for a, b in g] for g in pairs.values()]
     # Where every seed is a scene of its own, other seeds are other scenes.
-    is_random = all(len(group) == 1 for group in success)
+    is_random = all(a["arrangement_sha256"] is None for group in pairs.values() for a, _ in group)
     if is_random:
         success, steps = [[d for g in success for d in g]], [[d for g in steps for d in g]]
-    within = paired_bootstrap(success, rng)
+    within, elsewhere = _on_other_seeds(success, rng), None
+    if is_random and len(pairs) > 1:
+        elsewhere = within
+    elif len(pairs) > 1:
+        elsewhere = paired_bootstrap(success, rng, are_groups_drawn=True)
     differences = [d for group in success for d in group]
     return Comparison(
         policy=ours,
         against=other,
         pairs=len(differences),
         success=within,
-        success_elsewhere=(
-            within if is_random else paired_bootstrap(success, rng, are_groups_drawn=True)
-        ),
-        steps=paired_bootstrap(steps, rng),
+        success_elsewhere=elsewhere,
+        steps=_on_other_seeds(steps, rng),
         wins=sum(d > 0 for d in differences),
         losses=sum(d < 0 for d in differences),
     )
+
+
+def _on_other_seeds(groups: list[list[float]], rng: np.random.Generator) -> Interval:
+    """Estimate a mean; without ends if no scene was run twice, as if none could vary."""
+    found = paired_bootstrap(groups, rng)
+    if any(len(group) > 1 for group in groups):
+        return found
+    return Interval(value=found.value, low=float("nan"), high=float("nan"))

@@ -1,11 +1,12 @@
 """The tables of a report, made from lines of results alone."""
 
+from math import isnan
 from statistics import fmean
 from typing import Any
 
 from sr_mj.evaluation.plan import REFERENCES, Episode
 from sr_mj.evaluation.results import Lines
-from sr_mj.evaluation.statistics import wilson
+from sr_mj.evaluation.statistics import Interval, wilson
 from sr_mj.evaluation.summary import (
     Group,
     attempt_outcomes,
@@ -94,11 +95,11 @@ def comparison_table(lines: Lines) -> Table:
             *_cells(group),
             f"{c.policy} - {c.against}",
             c.pairs,
-            c.success,
+            _estimate(c.success),
             c.success_elsewhere,
             c.wins,
             c.losses,
-            c.steps,
+            _estimate(c.steps),
         )
         for group, records in by_group(lines).items()
         for c in compare(by_policy(records))
@@ -108,9 +109,10 @@ def comparison_table(lines: Lines) -> Table:
         title="Paired differences",
         note=(
             "The same scenes with the same seeds. Percentage points of success with 95 % intervals "
-            "by the paired bootstrap: first for other seeds on these scenes, then for other scenes "
-            "too, which is wide where there are few. Wins are pairs in which only the first "
-            "policy succeeded."
+            "by the paired bootstrap: first for other seeds on these scenes, where they were run "
+            "more than once; then for other scenes too, where there are more than one. With two or "
+            "three scenes the second is too narrow to be trusted. Wins are pairs in which only "
+            "the first policy succeeded."
         ),
         columns=(
             *_GROUP,
@@ -124,6 +126,10 @@ def comparison_table(lines: Lines) -> Table:
         ),
         rows=tuple(rows),
     )
+
+
+def _estimate(interval: Interval) -> Cell:
+    return interval.value if isnan(interval.low) else interval
 
 
 def cause_table(lines: Lines) -> Table:
@@ -219,7 +225,8 @@ def second_table(lines: Lines, seconds: dict[Episode, dict[str, float]]) -> Tabl
         title="Seconds",
         note=(
             "Mean wall time of an episode by stage, one thread each; the total has the making of "
-            "the scene too. Looks and feature maps that the previous policy left are used again."
+            "the scene too. Scene, hand-over and first look, which policies share, are counted "
+            "for each: an episode has the time that it would have taken alone."
         ),
         columns=(
             *_GROUP,

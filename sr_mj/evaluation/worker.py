@@ -22,10 +22,11 @@ from sr_mj.candidates.generator import CandidateGenerator
 from sr_mj.episode import run_episode
 from sr_mj.evaluation.blank import BlankEncoder
 from sr_mj.evaluation.conditions import read_condition
+from sr_mj.evaluation.identity import Identity
 from sr_mj.evaluation.lines import Done, result_line
 from sr_mj.evaluation.noisy import NoisyPoints
 from sr_mj.evaluation.plan import Episode
-from sr_mj.evaluation.setting import BLANK, Identity, Setting, load_choice
+from sr_mj.evaluation.setting import BLANK, Setting, load_choice
 from sr_mj.evaluation.shared import SharedScene
 from sr_mj.evaluation.snapshots import save_snapshots
 from sr_mj.oracle import OraclePolicy
@@ -63,7 +64,7 @@ class Worker:
         """
         start, before_s = time.perf_counter(), 0.0
         attempts: list[Attempt] = []
-        scene, error, trace = None, None, None
+        scene, pipeline, error, trace = None, None, None, None
         try:
             shared = self._shared_scene(episode)
             scene = shared.scene
@@ -72,7 +73,7 @@ class Worker:
             before_s, start = shared.seconds(encoder), time.perf_counter()
             self._act(episode, scene, pipeline, beginning, attempts)
         except Exception as exception:
-            error = f"{type(exception).__name__}: {exception}".splitlines()[0]
+            error = _in_one_line(exception)
             trace = traceback.format_exc()
             # What broke may have left it half changed.
             self._leave()
@@ -80,11 +81,15 @@ class Worker:
         for attempt in attempts:
             seconds.update(attempt.seconds)
         told = {} if scene is None else episode_record(scene, attempts, self._setting.attempts)
+        lost = None
+        if scene is not None and pipeline is not None and error is None:
+            lost = self._picture(episode, scene, pipeline, attempts)
         return Done(
             episode=episode,
             record=result_line(episode, self._setting, self._identity, told, error),
             seconds={name: round(value, 3) for name, value in seconds.items()},
             traceback=trace,
+            lost_pictures=lost,
         )
 
     def _shared_scene(self, episode: Episode) -> SharedScene:
@@ -130,8 +135,8 @@ class Worker:
     def _make_scene(self, episode: Episode) -> Scene:
         setting = self._setting
         if not episode.is_arranged:
-            if setting.make_random_scene is not None:
-                return setting.make_random_scene(episode)
+            if (maker := setting.scene_makers.get(episode.scene)) is not None:
+                return maker(episode)
             return make_scene(
                 SceneConfig(
                     scene=episode.scene,
@@ -165,8 +170,24 @@ class Worker:
             beginning=beginning,
         ):
             attempts.append(attempt)
-        if setting.pictures is not None and episode.seed in setting.picture_seeds:
+
+    def _picture(
+        self, episode: Episode, scene: Scene, pipeline: Pipeline, attempts: list[Attempt]
+    ) -> str | None:
+        """Keep pictures of an episode that has just ended, if asked for; say why if they are lost.
+
+        They are no part of the result: a full disk must not turn a success into a failure.
+        """
+        setting = self._setting
+        if setting.pictures is None or episode.seed not in setting.picture_seeds:
+            return None
+        try:
             save_snapshots(scene, pipeline, attempts, setting.pictures / episode.key)
+        except Exception as exception:
+            # What broke may be the renderer, which the next episode must not get.
+            self._leave()
+            return _in_one_line(exception)
+        return None
 
     def _lifter(self, workspace: Workspace, encoder: str) -> MultiViewLifter:
         key = (workspace, encoder)
@@ -193,3 +214,7 @@ class Worker:
             self._policies[label] = load_choice(choice, self._setting.encoder_fingerprints)
         policy = self._policies[label]
         return NoisyPoints(policy, condition.point_sigma) if condition.point_sigma else policy
+
+
+def _in_one_line(exception: Exception) -> str:
+    return f"{type(exception).__name__}: {exception}".splitlines()[0]

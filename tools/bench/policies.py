@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from sr_mj.scene import Scene
 
 
+PLACE_SCENES = ("place8", "pickplace8")
+"""Kinds of random scenes that get goals with a place part."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class BenchConfig:
     """What to run.
@@ -65,15 +69,12 @@ def wilson_interval(successes: int, runs: int) -> tuple[float, float]:
     return interval.low, interval.high
 
 
-def make_bench_scene(episode: "Episode") -> "Scene":
-    """Make the random scene of an episode."""
-    from sr_mj.scene import SceneConfig, make_scene
+def make_place_goal_scene(episode: "Episode") -> "Scene":
+    """Make the random scene of an episode in which something has to be placed."""
     from tools.bench.place_goals import make_place_scene
 
     split = "seen" if episode.split == "seen" else "unseen"
-    if episode.scene in ("place8", "pickplace8"):
-        return make_place_scene(episode.scene, split, episode.seed)
-    return make_scene(SceneConfig(scene=episode.scene, split=split, seed=episode.seed))
+    return make_place_scene(episode.scene, split, episode.seed)
 
 
 def bench_setting(config: BenchConfig) -> "Setting":
@@ -96,7 +97,7 @@ def bench_setting(config: BenchConfig) -> "Setting":
         attempts=config.attempts,
         versions=package_versions(),
         revision=git_revision(),
-        make_random_scene=policies.make_bench_scene,
+        scene_makers=dict.fromkeys(PLACE_SCENES, policies.make_place_goal_scene),
     )
 
 
@@ -145,9 +146,9 @@ def report(records: list[dict[str, Any]]) -> None:
 def main(config: BenchConfig) -> int:
     """Run what is missing, then report."""
     select_backend()
+    from sr_mj.evaluation.identity import Identity
     from sr_mj.evaluation.pool import run_episodes
     from sr_mj.evaluation.results import ResultFolder
-    from sr_mj.evaluation.setting import Identity
 
     setting = bench_setting(config)
     episodes, identity = bench_episodes(config, setting), Identity(setting)

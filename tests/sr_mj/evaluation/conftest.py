@@ -2,9 +2,10 @@
 
 import pytest
 
+from sr_mj.evaluation.identity import Identity
 from sr_mj.evaluation.lines import Done, result_line
 from sr_mj.evaluation.plan import Episode, PolicyChoice
-from sr_mj.evaluation.setting import Identity, Setting
+from sr_mj.evaluation.setting import Setting
 
 LABELS = ("oracle", "random", "grounding", "sr")
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 import torch
@@ -13,9 +14,10 @@ import torch
 from perception.encoders import load_encoder
 from sr_mj.errors import ConfigError
 from sr_mj.eval import EvalConfig, run
+from sr_mj.evaluation.identity import Identity
 from sr_mj.evaluation.plan import plan_random, read_policies
 from sr_mj.evaluation.results import LINES, ResultFolder, read_lines
-from sr_mj.evaluation.setting import Identity, Setting
+from sr_mj.evaluation.setting import Setting
 from sr_mj.evaluation.worker import Worker
 
 SEEDS = (103, 104)
@@ -162,6 +164,61 @@ def test_results_of_other_options_are_not_resumed(make_done, setting):
         "grasp-seen-02_seen_clean_0000_random, this run has 8; use the same options and files, or "
         "a new --out."
     )
+
+
+@pytest.fixture
+def resumed(tmp_path, setting, make_done, monkeypatch):
+    """Return a function that resumes a folder, and returns the episodes that it ran again."""
+    monkeypatch.setattr("sr_mj.eval._setting", lambda *_: setting)
+
+    def resume(before, **options):
+        ran = []
+
+        def run_episodes(episodes, *_, **__):
+            for episode in episodes:
+                ran.append(episode)
+                done = make_done(episode.policy, episode.seed)
+                yield replace(done, lost_pictures="OSError: full" if episode.seed else None)
+
+        monkeypatch.setattr("sr_mj.evaluation.pool.run_episodes", run_episodes)
+        with ResultFolder(tmp_path, resume=True) as folder:
+            for done in before:
+                folder.add(done)
+        config = EvalConfig(
+            suite=("grasp",), arrangements=("grasp-seen-02",), split="seen", policy=("random",),
+            runs=2, out=tmp_path, resume=True, **options,
+        )  # fmt: skip
+        assert run(config) == 0
+        return [(episode.policy, episode.seed) for episode in ran]
+
+    return resume
+
+
+def test_what_is_not_planned_again_is_checked_too(resumed, make_done, tmp_path):
+    """Its results would stand in the same rows."""
+    unplanned = make_done("sr", 77)
+    record = {**unplanned.record, "max_attempts": 3}
+    with pytest.raises(ConfigError, match=r"have max_attempts 3 in episode .*_0077_sr, this run"):
+        resumed([replace(unplanned, record=record)])
+    assert not (tmp_path / "run.json").exists()
+
+
+def test_errors_run_again_if_that_is_asked_for(resumed, make_done, capsys, tmp_path):
+    before = [
+        make_done("random", 0, error="ValueError: no"),
+        make_done("random", 1),
+        make_done("oracle", 0),
+        make_done("oracle", 7, error="ValueError: not planned now"),
+    ]
+    assert resumed(before) == [("oracle", 1)]
+    told = capsys.readouterr().err
+    assert "2 episodes ended in an exception and count as failures; " in told
+    assert "Pictures of 1 episodes could not be kept (OSError: full); their results are." in told
+    assert resumed([], retry_errors=True) == [("random", 0)]
+    told = capsys.readouterr().err
+    assert "1 episodes ended in an exception" in told and "Pictures" not in told
+    lines = read_lines(tmp_path)[0]
+    assert [line["seed"] for line in lines.values() if line["error"]] == [7]
 
 
 def test_the_command_line_answers_mistakes_in_one_line(tmp_path):

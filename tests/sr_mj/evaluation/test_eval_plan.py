@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,11 @@ def test_a_checkpoint_names_its_policy(tmp_path):
             "Unknown policy 'grunding'. Policies: {all}. Did you mean 'grounding'?",
         ),
         (["sr@nowhere.st"], "Checkpoint 'nowhere.st' of policy 'sr' is no file; check it."),
+        (
+            ["oracle@README.md"],
+            "Policy 'oracle' is given the checkpoint 'README.md', but has no weights; leave the "
+            "checkpoint out, or name the policy that it belongs to.",
+        ),
     ],
 )
 def test_bad_policies_get_one_line(policies, message):
@@ -124,9 +130,19 @@ def test_random_scenes_are_not_mistaken_for_arrangements():
             "perturbation, all. Did you mean 'grasp'?",
         ),
         (
-            lambda: plan_suites(["grasp"], BOTH, [0], ONE, only=["place-seen-00"]),
-            "Nothing to run: no arrangement of the suites grasp is left with split seen and "
-            "unseen, 1 seeds and place-seen-00.",
+            lambda: plan_suites(["grasp"], BOTH, [0], ONE, only=["grasp-seen-00", "place-seen-00"]),
+            "Arrangement 'place-seen-00' is in none of the suites grasp with split seen and "
+            "unseen; add its suite and split, or leave it out.",
+        ),
+        (
+            lambda: plan_suites(["grasp"], ["unseen"], [0], ONE, only=["grasp-seen-00"]),
+            "Arrangement 'grasp-seen-00' is in none of the suites grasp with split unseen; add its "
+            "suite and split, or leave it out.",
+        ),
+        (
+            lambda: plan_suites(["grasp"], BOTH, [], ONE),
+            "Nothing to run in the suites grasp: got 0 seeds and 1 policies, expected at least one "
+            "of each.",
         ),
         (
             lambda: plan_suites(["grasp"], BOTH, [0], ONE, conditions=["foggy"]),
@@ -170,11 +186,18 @@ def test_sensor_noise_is_scaled_and_can_be_switched_off():
     plain = L515NoiseConfig()
     assert read_condition("clean").sensor_noise() == plain
     assert read_condition("l515-0x").sensor_noise() == L515NoiseConfig.off()
-    double = read_condition("l515-2x").sensor_noise()
-    assert double.axial_sigma_at_zero_m == 2 * plain.axial_sigma_at_zero_m
-    assert double.lateral_sigma_px == 2 * plain.lateral_sigma_px
-    assert double.full_well_electrons == plain.full_well_electrons / 4
-    assert read_condition("l515-4x").sensor_noise().flying_rate == 1.0
+    # Everything that is not named here stays as it is.
+    assert read_condition("l515-1.5x").sensor_noise() == replace(
+        plain,
+        axial_sigma_at_zero_m=1.5 * plain.axial_sigma_at_zero_m,
+        axial_sigma_per_m=1.5 * plain.axial_sigma_per_m,
+        lateral_sigma_px=1.5 * plain.lateral_sigma_px,
+        flying_rate=0.3 * 1.5,
+        dark_rate=0.5 * 1.5,
+        full_well_electrons=plain.full_well_electrons / 1.5**2,
+    )
+    strong = read_condition("l515-4x").sensor_noise()
+    assert (strong.flying_rate, strong.dark_rate) == (1.0, 1.0)
 
 
 class Remembers:

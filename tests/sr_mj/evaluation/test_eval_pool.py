@@ -15,7 +15,7 @@ pytestmark = pytest.mark.distributed
 @pytest.fixture
 def broken_setting(setting):
     """Random scenes cannot be made: an exception at once."""
-    return replace(setting, make_random_scene=operator.index)
+    return replace(setting, scene_makers={"single": operator.index})
 
 
 class Killer(threading.Thread):

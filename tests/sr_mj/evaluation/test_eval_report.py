@@ -1,6 +1,7 @@
 import csv
 import io
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -19,7 +20,7 @@ from sr_mj.evaluation.published import (
 )
 from sr_mj.evaluation.report import merge_results, warnings_about, write_report
 from sr_mj.evaluation.results import ResultFolder, snapshot_path
-from sr_mj.evaluation.statistics import Interval, wilson
+from sr_mj.evaluation.statistics import Interval, paired_bootstrap, wilson
 from sr_mj.evaluation.summary import (
     by_group,
     by_policy,
@@ -29,7 +30,7 @@ from sr_mj.evaluation.summary import (
     score,
 )
 from sr_mj.evaluation.table import Column, Table
-from sr_mj.evaluation.tables import overview_table
+from sr_mj.evaluation.tables import comparison_table, overview_table
 
 GOOD, BAD = ("grasped_target",), ("wrong_object", "slip_lift")
 
@@ -85,8 +86,70 @@ def test_differences_are_paired(dones, as_lines):
     assert of_random.success.value == 0.5
     assert (of_oracle.wins, of_oracle.losses, of_oracle.success.value) == (0, 1, -0.25)
     assert of_oracle.success.low <= -0.25 <= of_oracle.success.high <= 0
-    # With one scene, other scenes are unknown: nothing can be added to the interval.
-    assert of_oracle.success_elsewhere.value == -0.25
+    # One scene tells nothing of others.
+    assert of_oracle.success_elsewhere is None
+
+
+def near(found, groups, **how):
+    """Whether an interval is that of the bootstrap, by other draws than those that it is from."""
+    expected = paired_bootstrap(groups, np.random.default_rng(99), num_draws=40_000, **how)
+    return np.allclose(*([i.value, i.low, i.high] for i in (found, expected)), rtol=0, atol=0.05)
+
+
+def test_every_difference_has_an_interval_of_its_own(make_done, as_lines):
+    """Scenes of different size, whose pairs differ within; steps are another story than success."""
+    ours = {"grasp-seen-00": "11010111", "grasp-seen-01": "011", "grasp-seen-02": "00101"}
+    reasons = {"0": ("slip_lift",) * 4, "1": GOOD}
+    dones = [
+        make_done(policy, seed, scene=scene, reasons=reasons[digit])
+        for scene, digits in ours.items()
+        for seed, digit in enumerate(digits)
+        for policy, digit in (("sr", digit), ("random", "0"))
+    ]
+    (found,) = compare(group_of(as_lines(dones)))
+    success = [[float(digit) for digit in digits] for digits in ours.values()]
+    steps = [[-3 * d for d in group] for group in success]
+    assert near(found.success, success)
+    assert near(found.success_elsewhere, success, are_groups_drawn=True)
+    assert near(found.steps, steps)
+    assert not near(found.success_elsewhere, success) and not near(found.steps, success)
+    cells = comparison_table(as_lines(dones)).rows[0][5:]
+    assert cells == (found.success, found.success_elsewhere, 10, 0, found.steps)
+
+
+def test_where_every_seed_is_a_scene_other_seeds_are_other_scenes(make_done, as_lines):
+    random_scene = {"scene": "cluttered15", "task": "random-cluttered15"}
+    dones = [
+        make_done(
+            policy, seed, reasons=GOOD if policy == "sr" and seed % 3 else BAD, **random_scene
+        )
+        for policy in ("sr", "random")
+        for seed in range(30)
+    ]
+    (found,) = compare(group_of(as_lines(dones)))
+    assert found.success_elsewhere == found.success
+    assert near(found.success, [[float(seed % 3 > 0) for seed in range(30)]])
+    (alone,) = compare(group_of(as_lines(d for d in dones if d.episode.seed == 0)))
+    assert alone.success_elsewhere is None and np.isnan(alone.success.low)
+
+
+def test_one_run_of_each_arrangement_tells_nothing_of_other_seeds(make_done, as_lines):
+    dones = [
+        make_done(policy, scene=scene, reasons=GOOD if policy == "sr" and number % 2 else BAD)
+        for policy in ("sr", "random")
+        for number, scene in enumerate(arrangement_names("grasp", "seen"))
+    ]
+    lines = as_lines(dones)
+    (found,) = compare(group_of(lines))
+    assert found.success.value == 0.5 and np.isnan([found.success.low, found.steps.high]).all()
+    groups = [[float(number % 2)] for number in range(10)]
+    assert near(found.success_elsewhere, groups, are_groups_drawn=True)
+    table = comparison_table(lines)
+    assert table.shown()[0][5:7] == (
+        "+50.0", f"+50.0 [{found.success_elsewhere.low * 100:+.1f}, +80.0]"
+    )  # fmt: skip
+    only_one = as_lines(d for d in dones if d.episode.scene == "grasp-seen-01")
+    assert comparison_table(only_one).shown()[0][5:7] == ("+100.0", "")
 
 
 def test_only_common_episodes_are_compared(dones, as_lines):
@@ -185,6 +248,9 @@ def test_results_of_several_folders_make_one_report(tmp_path, dones, make_done):
         ConfigError, match=r"has another result of grasp-seen-02_seen_clean_0000_sr"
     ):
         merge_results([tmp_path / "a", tmp_path / "c"])
+    with ResultFolder(tmp_path / "d") as folder:
+        folder.add(replace(dones[0], record={**dones[0].record, "revision": "x", "versions": None}))
+    assert merge_results([tmp_path / "a", tmp_path / "d"])[0][dones[0].episode] == dones[0].record
     (tmp_path / "empty").mkdir()
     with pytest.raises(ConfigError, match=r"^There are no results in '.*empty'; give a folder"):
         merge_results([tmp_path / "empty"])
@@ -203,7 +269,12 @@ def test_ours_stand_beside_what_was_published(tmp_path, dones, as_lines, make_do
     assert (row["published_method"], row["published_seen"], row["our_seen"]) == ("SR", "92", "0.75")
     assert row["our_unseen"] == ""
     rows = list(csv.DictReader((tables / "paper-2.csv").open()))
-    assert [r["goal"] for r in rows if r["our_runs"]] == ["Give me the pear"]
+    (row,) = (r for r in rows if r["our_runs"])
+    assert row["goal"] == "Give me the pear" and row["our_success"] == "0.75"
+    # In per cent, as the column says, though the paper prints shares.
+    shown = (tmp_path / "report.md").read_text()
+    assert "| Give me the pear | 100 | 3.1 | 3.1 | 0.369404 | 4 | 75.0 [30.1, 95.4] |" in shown
+    assert "| I need a fruit | 90 | 3.3 |" in shown
     rows = {r["sparsifier"]: r for r in csv.DictReader((tables / "paper-4.csv").open())}
     assert rows["published: ReLU²"]["points-0.1"] == "86.7"
     assert rows["ours: sr (ReLU²)"]["points-0.1"] == "1.0"

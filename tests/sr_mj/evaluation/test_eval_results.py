@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from sr_mj.errors import ConfigError
+from sr_mj.evaluation.identity import NOT_KNOWN_BEFORE
 from sr_mj.evaluation.results import LINES, SECONDS, ResultFolder, read_lines
 
 
@@ -70,6 +71,56 @@ def test_a_torn_last_line_costs_one_episode(tmp_path, dones, cut):
     write(tmp_path, dones[-1:], resume=True)
     write(tmp_path / "whole", dones)
     assert (tmp_path / LINES).read_bytes() == (tmp_path / "whole" / LINES).read_bytes()
+
+
+def test_a_line_torn_inside_a_letter_costs_one_episode(tmp_path, make_done):
+    done = make_done(goal="Gib mir das Stück Käse")
+    write(tmp_path, [make_done(seed=1), done], resume=True, finish=False)
+    journal = tmp_path / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes().rpartition("ä".encode())[0] + b"\xc3")
+    assert [episode.seed for episode in read_lines(tmp_path)[0]] == [1]
+
+
+def test_a_file_without_a_last_line_break_loses_nothing(tmp_path, dones):
+    path = tmp_path / "lines.jsonl"
+    text = "\n".join(json.dumps(done.record) for done in dones)
+    path.write_text(text)
+    assert read_lines(path)[0] == {done.episode: done.record for done in dones}
+    # What was cut in a file of its own is told: nobody knows what else is missing.
+    path.write_text(text[:-7])
+    with pytest.raises(ConfigError, match=r"^Results '.*' cannot be read \(line 6: Expecting"):
+        read_lines(path)
+
+
+def test_other_files_get_one_line(tmp_path, dones):
+    write(tmp_path, dones[:1], resume=True)
+    write(tmp_path, dones[1:2], resume=True, finish=False)
+    record = dones[0].record
+    (tmp_path / "list.jsonl").write_text("[1]\n")
+    (tmp_path / "text.jsonl").write_text("hello\n")
+    (tmp_path / "kind.jsonl").write_text(json.dumps({**record, "seed": "0"}))
+    (tmp_path / "attempt.jsonl").write_text(json.dumps({**record, "attempts": [{"kind": "pick"}]}))
+    for name, problem in (
+        ("journal.jsonl", "line 1: there is no 'task'"),
+        ("seconds.jsonl.gz", "line 1: there is no 'success'"),
+        ("list.jsonl", "line 1: expected an object with names and values"),
+        ("text.jsonl", "line 1: Expecting value: line 1 column 1 (char 0)"),
+        ("kind.jsonl", "line 1: 'seed' is '0'"),
+        ("attempt.jsonl", "line 1: there is no 'is_hand_over'"),
+    ):
+        with pytest.raises(ConfigError) as error:
+            read_lines(tmp_path / name)
+        assert str(error.value) == (
+            f"Results '{tmp_path}/{name}' cannot be read ({problem}); give a folder that "
+            "python -m sr_mj.eval wrote, or its episodes.jsonl.gz."
+        )
+
+
+def test_lines_of_earlier_versions_are_read(tmp_path, dones):
+    lines = [{k: v for k, v in d.record.items() if k not in NOT_KNOWN_BEFORE} for d in dones]
+    path = tmp_path / "old.jsonl"
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    assert list(read_lines(path)[0].values()) == lines
 
 
 def test_nothing_is_lost_when_the_process_is_killed(tmp_path, make_done):

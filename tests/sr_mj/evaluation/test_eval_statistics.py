@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -73,6 +75,43 @@ def test_drawing_scenes_sees_what_drawing_pairs_cannot():
 def test_scenes_of_unequal_size_count_by_their_pairs():
     found = paired_bootstrap([[1.0] * 3, [0.0]], np.random.default_rng(0), are_groups_drawn=True)
     assert found.value == 0.75
+
+
+def every_mean(groups, are_groups_drawn):
+    """Every mean that can be drawn, with its probability: sorted means, cumulated shares."""
+    means, shares = [], []
+    choices = itertools.product(groups, repeat=len(groups)) if are_groups_drawn else [groups]
+    choices = list(choices)
+    for chosen in choices:
+        # What is drawn anew for every group, also for one that was chosen twice.
+        draws = [list(itertools.product(group, repeat=len(group))) for group in chosen]
+        found = [sum(map(sum, pairs)) for pairs in itertools.product(*draws)]
+        means += [total / sum(map(len, chosen)) for total in found]
+        shares += [1 / len(choices) / len(found)] * len(found)
+    order = np.argsort(means)
+    return np.array(means)[order], np.cumsum(np.array(shares)[order])
+
+
+@pytest.mark.parametrize("are_drawn", [False, True])
+@pytest.mark.parametrize("level", [0.3, 0.5, 0.8, 0.95])
+def test_ends_are_quantiles_of_all_that_can_be_drawn(are_drawn, level):
+    # Differences vary within the groups, whose sizes differ.
+    groups = [[0.0, 1.0], [0.0, 0.0, 4.0]]
+    means, shares = every_mean(groups, are_drawn)
+    found = paired_bootstrap(
+        groups, np.random.default_rng(0), are_groups_drawn=are_drawn, level=level, num_draws=40_000
+    )
+    assert found.value == 1.0
+    for end, quantile in ((found.low, (1 - level) / 2), (found.high, (1 + level) / 2)):
+        below = shares[np.searchsorted(means, end - 1e-9) - 1] if end > means[0] else 0.0
+        up_to = shares[np.searchsorted(means, end + 1e-9) - 1]
+        assert below - 0.01 <= quantile <= up_to + 0.01
+
+
+def test_one_scene_tells_nothing_of_others():
+    with pytest.raises(ValueError) as error:
+        paired_bootstrap([[0.0, 1.0], []], np.random.default_rng(0), are_groups_drawn=True)
+    assert str(error.value) == "Got one scene to draw scenes from; expected at least two."
 
 
 def test_same_generator_same_interval():
