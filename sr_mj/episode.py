@@ -255,7 +255,9 @@ def _plan(
         return plan
     # An error is nothing that a planner knows: it does not change the choice, and where the erring
     # pose touches something, that is what the robot runs into.
-    erring = pipeline.perturbation.apply(candidates.take([plan.chosen]), rngs.perturbation)
+    erring = pipeline.perturbation.apply(
+        candidates.take(np.array([plan.chosen])), rngs.perturbation
+    )
     for obstacles in (cloud.points, None):
         erred = pipeline.planner.plan(
             erring, np.array([0]), obstacles=obstacles, held=held, start=start
