@@ -42,6 +42,15 @@ class Condition:
     pose_sigma_cm: float = 0.0
     pose_sigma_deg: float = 0.0
 
+    @property
+    def beginning(self) -> str:
+        """Name of the plainest condition with the same scene, hand-over and first look.
+
+        Noise of the policy's points and errors of the executed pose come after these.
+        """
+        is_later = self.point_sigma or self.pose_sigma_cm or self.pose_sigma_deg
+        return "clean" if is_later else self.name
+
     def perturbation(self) -> "PosePerturbation | None":
         """Return the error of executed poses, None for none.
 

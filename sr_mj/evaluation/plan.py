@@ -1,7 +1,7 @@
 """Which episodes a suite consists of, and which policies run them."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +60,11 @@ class Episode:
     def is_arranged(self) -> bool:
         """Whether the scene is a fixed arrangement."""
         return self.task in TASKS
+
+    @property
+    def beginning(self) -> "Episode":
+        """What stands for all episodes with the same scene, hand-over and first look."""
+        return replace(self, policy="", condition=read_condition(self.condition).beginning)
 
     @classmethod
     def of_record(cls, record: dict[str, Any]) -> "Episode":

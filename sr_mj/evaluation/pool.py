@@ -3,7 +3,6 @@
 import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import replace
 from functools import partial
 
 from sr_mj.evaluation.identity import Identity
@@ -21,8 +20,8 @@ def run_episodes(
 ) -> Generator[Done]:
     """Run episodes.
 
-    Policies of the same scene and seed are given to the same process, one after another, as they
-    share how the episode begins. Each process has one thread, whatever their number: sums then add
+    Episodes that begin alike (`Episode.beginning`) are given to the same process, one after another,
+    as they share that. Each process has one thread, whatever their number: sums then add
     up in the same order, and the same episode gives the same line everywhere. An episode whose
     process dies again and again counts as a failure.
 
@@ -65,7 +64,7 @@ def run_episodes(
 
 
 class _Waiting:
-    """Episodes that nobody has begun, in groups that differ in their policy alone.
+    """Episodes that nobody has begun, in groups that begin alike.
 
     Args:
         episodes: In the order in which they are to be run.
@@ -74,14 +73,14 @@ class _Waiting:
     def __init__(self, episodes: Sequence[Episode]) -> None:
         self._groups: dict[Episode, deque[Episode]] = {}
         for episode in episodes:
-            self._groups.setdefault(_group(episode), deque()).append(episode)
+            self._groups.setdefault(episode.beginning, deque()).append(episode)
         self._begun: set[Episode] = set()
 
     def next_after(self, last: Episode | None) -> Episode | None:
         """Take an episode of the last one's group, or else one that nobody has begun, or any."""
         if not self._groups:
             return None
-        group = None if last is None else _group(last)
+        group = None if last is None else last.beginning
         if group not in self._groups:
             group = next((g for g in self._groups if g not in self._begun), None)
         if group is None:
@@ -91,10 +90,6 @@ class _Waiting:
         if not self._groups[group]:
             del self._groups[group]
         return episode
-
-
-def _group(episode: Episode) -> Episode:
-    return replace(episode, policy="")
 
 
 def make_runner(setting: Setting) -> Callable[[Episode], Done]:

@@ -1,4 +1,4 @@
-"""What the policies share that run in the same scene with the same seed, one after the other."""
+"""What episodes share that begin alike and run one after the other."""
 
 import time
 from collections.abc import Callable
@@ -10,6 +10,7 @@ from sr_mj.beginning import Beginning, HandOver
 from sr_mj.episode import begin_episode, hand_over
 from sr_mj.evaluation.plan import Episode
 from sr_mj.evaluation.setting import BLANK
+from sr_mj.perturbation import PosePerturbation
 from sr_mj.pipeline import Pipeline
 from sr_mj.scene import Scene
 
@@ -17,13 +18,13 @@ from sr_mj.scene import Scene
 class SharedScene:
     """A scene, its cameras, what is handed over in it, and the first look at it.
 
-    None of these depends on the policy. Every policy begins in the same state, to the bit, and its
-    record is the one that it would have alone.
+    None of these depends on the policy, nor on what a condition changes later. Every episode begins
+    in the same state, to the bit, and its record is the one that it would have alone.
 
     Args:
         episode: One of the episodes that share it.
         scene: The scene.
-        pipeline: Its stages; lifter and policy are those of the episode.
+        pipeline: Its stages; lifter, policy and errors of the pose are those of the episode.
         lifter: Makes the perception stage of an encoder.
         max_attempts: Grasps that may be tried.
         made_s: Seconds that it took to make the scene.
@@ -48,14 +49,17 @@ class SharedScene:
 
     def fits(self, episode: Episode) -> bool:
         """Tell whether an episode takes place here."""
-        return replace(episode, policy="") == replace(self._episode, policy="")
+        return episode.beginning == self._episode.beginning
 
-    def begin(self, encoder: str, policy: Policy) -> tuple[Pipeline, Beginning]:
+    def begin(
+        self, encoder: str, policy: Policy, perturbation: PosePerturbation | None
+    ) -> tuple[Pipeline, Beginning]:
         """Prepare an episode.
 
         Args:
             encoder: What its policy looks through.
             policy: The policy.
+            perturbation: Error of the poses that it executes, None for none.
 
         Returns:
             The stages, and where the episode begins.
@@ -71,7 +75,8 @@ class SharedScene:
                 handed=handed,
             )
             self._begun_s[encoder] = self._handed_s + time.perf_counter() - start
-        return replace(self._with(encoder), policy=policy), self._beginnings[encoder]
+        pipeline = replace(self._with(encoder), policy=policy, perturbation=perturbation)
+        return pipeline, self._beginnings[encoder]
 
     def seconds(self, encoder: str) -> float:
         """Return what scene, hand-over and first look took: what an episode alone would wait."""

@@ -69,7 +69,9 @@ class Worker:
             shared = self._shared_scene(episode)
             scene = shared.scene
             encoder = self._setting.encoder_for(episode.policy)
-            pipeline, beginning = shared.begin(encoder, self._policy(episode, scene))
+            perturbation = read_condition(episode.condition).perturbation()
+            policy = self._policy(episode, scene)
+            pipeline, beginning = shared.begin(encoder, policy, perturbation)
             before_s, start = shared.seconds(encoder), time.perf_counter()
             self._act(episode, scene, pipeline, beginning, attempts)
         except Exception as exception:
@@ -113,7 +115,6 @@ class Worker:
                 policy=RandomPolicy(),
                 generator=self._generator,
                 planner=self._planner,
-                perturbation=condition.perturbation(),
                 keep_unreachable=setting.keep_unreachable,
             )
         )

@@ -138,9 +138,8 @@ def test_what_ran_before_does_not_matter(one_thread):
         encoder_fingerprint=encoder.fingerprint,
         attempts=1,
     )
-    episodes = plan_random(
-        "single", "seen", [103, 106], setting.policies, conditions=["clean", "points-0.1"]
-    )
+    conditions = ["clean", "points-0.1", "pose-1cm-5deg"]
+    episodes = plan_random("single", "seen", [103, 106], setting.policies, conditions=conditions)
     chosen = [e for e in episodes if e.seed == 103 or e.policy == "grounding"]
     forth, back = Worker(setting), Worker(setting)
     first = {episode: forth.run(episode).record for episode in chosen}

@@ -175,6 +175,10 @@ def test_conditions_say_what_their_names_say():
     assert (perturbation.sigma_m, perturbation.sigma_deg) == (0.005, 2)
     for name in ("clean", "points-0.3", "l515-0x"):
         assert read_condition(name).perturbation() is None
+    for name in ("clean", "points-0.3", "pose-0.5cm-2deg"):
+        assert read_condition(name).beginning == "clean"
+    for name in ("reworded", "l515-0x", "l515-2x"):
+        assert read_condition(name).beginning == name
 
 
 def test_absurd_errors_of_the_pose_are_refused():

@@ -74,6 +74,9 @@ def test_each_condition_reaches_its_stage(watched):
     error_m = np.linalg.norm(executed(erring)[:3, 3] - preferred(candidates)[:3, 3])
     assert 1e-4 < error_m < 0.03
 
+    # The three begin alike and share the first look, but nothing that a condition changes later.
+    assert watched("clean")[0] == plain
+
     truth, twice = (depth(watched(condition)[1]) for condition in ("l515-0x", "l515-2x"))
     units = truth[truth > 0] / UNIT_M
     assert np.abs(units - np.rint(units)).max() > 0.1
