@@ -10,7 +10,7 @@ import torch
 from policy.actions import ActionCandidates, ActionDecoding, ActionScores
 from policy.errors import MissingCheckpointError
 from policy.network.base import CandidateNetwork
-from policy.network.batch import SRBatch, collate, make_sample
+from policy.network.batch import DecisionBatch, collate, make_sample
 from policy.network.checkpoint import load_checkpoint
 from policy.observation import Observation
 
@@ -121,6 +121,6 @@ class LearntPolicy(Generic[Network]):
         observation: Observation,
         candidates: ActionCandidates,
         chosen: np.ndarray | None = None,
-    ) -> SRBatch:
+    ) -> DecisionBatch:
         sample = make_sample(observation, candidates, self.network.config, chosen=chosen)
         return collate([sample]).to(next(self.network.parameters()).device)

@@ -13,8 +13,8 @@ from policy.errors import InvalidConfigError
 from policy.learnt import LearntPolicy
 from policy.network.alignment import scaled_similarity
 from policy.network.base import CandidateNetwork
-from policy.network.batch import SRBatch
-from policy.network.decoder import SROutput
+from policy.network.batch import DecisionBatch
+from policy.network.decoder import NetworkOutput
 from policy.network.encoding import fourier_features, mlp, num_fourier_features
 
 
@@ -70,7 +70,7 @@ class CrossLayer(nn.Module):
         states: Float[Tensor, "batch candidates width"],
         keys: Float[Tensor, "batch points width"],
         values: Float[Tensor, "batch points width"],
-        batch: SRBatch,
+        batch: DecisionBatch,
     ) -> Float[Tensor, "batch candidates width"]:
         """Let the candidates ask once.
 
@@ -128,7 +128,7 @@ class A2Network(CandidateNetwork):
         self.norm = nn.LayerNorm(width)
         self.scores = CandidateScores(config)
 
-    def forward(self, batch: SRBatch) -> SROutput:
+    def forward(self, batch: DecisionBatch) -> NetworkOutput:
         """Score the candidates of a batch of decisions.
 
         Args:
@@ -144,7 +144,7 @@ class A2Network(CandidateNetwork):
             states = layer(states, keys, values, batch)
         return self.scores(self.norm(states), self.candidates.known_phase(batch), batch)
 
-    def weighted_features(self, batch: SRBatch) -> Float[Tensor, "batch points channels"]:
+    def weighted_features(self, batch: DecisionBatch) -> Float[Tensor, "batch points channels"]:
         """Features times similarity.
 
         Args:

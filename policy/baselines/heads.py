@@ -8,9 +8,9 @@ from jaxtyping import Float, Int
 from torch import Tensor, nn
 from torch.nn.functional import softplus
 
-from policy.network.batch import PHASES, SRBatch
+from policy.network.batch import PHASES, DecisionBatch
 from policy.network.config import NetworkConfig
-from policy.network.decoder import ActionDecoder, SROutput
+from policy.network.decoder import ActionDecoder, NetworkOutput
 from policy.network.encoding import fourier_features, mlp, num_fourier_features
 
 # As in the SR network: between two grasps of one object.
@@ -56,7 +56,7 @@ class CandidateTokens(nn.Module):
         self.pose = mlp(7 + num_fourier_features(self.num_bands), width, width, width)
         self.phase = nn.Embedding(len(PHASES), width)
 
-    def forward(self, batch: SRBatch) -> Float[Tensor, "batch candidates width"]:
+    def forward(self, batch: DecisionBatch) -> Float[Tensor, "batch candidates width"]:
         """Embed the candidates.
 
         Args:
@@ -69,7 +69,7 @@ class CandidateTokens(nn.Module):
         rows = self.pose(torch.cat([batch.poses, waves], dim=-1))
         return rows + self.phase(self.known_phase(batch))[:, None]
 
-    def known_phase(self, batch: SRBatch) -> Int[Tensor, " batch"]:
+    def known_phase(self, batch: DecisionBatch) -> Int[Tensor, " batch"]:
         """Index into `PHASES`, without the side if that is not to be known."""
         return batch.phase if self.uses_side else batch.phase.clamp(max=1)
 
@@ -98,8 +98,8 @@ class CandidateScores(nn.Module):
         self,
         states: Float[Tensor, "batch candidates width"],
         phase: Int[Tensor, " batch"],
-        batch: SRBatch,
-    ) -> SROutput:
+        batch: DecisionBatch,
+    ) -> NetworkOutput:
         """Read out every candidate.
 
         Args:

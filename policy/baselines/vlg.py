@@ -14,9 +14,9 @@ from policy.learnt import LearntPolicy
 from policy.network.alignment import scaled_similarity
 from policy.network.attention import MultiHeadAttention
 from policy.network.base import CandidateNetwork
-from policy.network.batch import SRBatch
+from policy.network.batch import DecisionBatch
 from policy.network.bias import RelativePositionBias, bias_scales, position_basis
-from policy.network.decoder import SROutput
+from policy.network.decoder import NetworkOutput
 from policy.network.encoding import fourier_features, mlp, num_fourier_features
 from policy.network.objects import ObjectBatch
 
@@ -171,7 +171,7 @@ class VLGNetwork(CandidateNetwork):
         self.norm = nn.LayerNorm(config.width)
         self.scores = CandidateScores(config)
 
-    def forward(self, batch: SRBatch) -> SROutput:
+    def forward(self, batch: DecisionBatch) -> NetworkOutput:
         """Score the candidates of a batch of decisions.
 
         Args:

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from policy.network.attention import MultiHeadAttention, masked_softmax, scaled_scores
-from policy.network.batch import PHASES, SRBatch
+from policy.network.batch import PHASES, DecisionBatch
 from policy.network.bias import CandidateBias, candidate_basis
 from policy.network.config import SRConfig
 from policy.network.encoding import fourier_features, mlp, num_fourier_features
@@ -72,7 +72,7 @@ class LanguageAlignment(nn.Module):
         nn.init.zeros_(self.query.bias)
         nn.init.zeros_(self.token_weight.weight)
 
-    def gate(self, batch: SRBatch) -> Float[Tensor, "batch heads points"]:
+    def gate(self, batch: DecisionBatch) -> Float[Tensor, "batch heads points"]:
         """The semantic mask.
 
         The features of the whole sentence and of the phrase join the tokens as two more, because
@@ -136,7 +136,7 @@ class PointwiseLanguageAttention(nn.Module):
         self.norm = nn.LayerNorm(config.width)
 
     def forward(
-        self, x: Float[Tensor, "batch points width"], batch: SRBatch
+        self, x: Float[Tensor, "batch points width"], batch: DecisionBatch
     ) -> Float[Tensor, "batch points width"]:
         """Add to every point what it finds in the language.
 
@@ -183,7 +183,7 @@ class ActionAlignment(nn.Module):
 
     def forward(
         self,
-        batch: SRBatch,
+        batch: DecisionBatch,
         phase: Int[Tensor, " batch"],
         values: Float[Tensor, "batch points width"],
         mask: Float[Tensor, "batch heads points"],

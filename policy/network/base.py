@@ -7,9 +7,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from policy.network.batch import SRBatch
+from policy.network.batch import DecisionBatch
 from policy.network.config import NetworkConfig
-from policy.network.decoder import SROutput
+from policy.network.decoder import NetworkOutput
 
 
 class CandidateNetwork(nn.Module):
@@ -24,7 +24,7 @@ class CandidateNetwork(nn.Module):
     config: NetworkConfig
 
     @abstractmethod
-    def forward(self, batch: SRBatch) -> SROutput:
+    def forward(self, batch: DecisionBatch) -> NetworkOutput:
         """Score the candidates of a batch of decisions.
 
         Args:

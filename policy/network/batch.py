@@ -24,7 +24,7 @@ PHASES = ("pick", "place", "place inside", "place outside")
 
 
 @dataclass(frozen=True, kw_only=True)
-class SRSample:
+class DecisionSample:
     """One decision: a thinned cloud, an instruction, candidates. Arrays are read-only.
 
     Attributes:
@@ -82,7 +82,7 @@ class SRSample:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SRBatch:
+class DecisionBatch:
     """B decisions padded to common sizes N, T and K, each at least 1.
 
     Attributes:
@@ -115,15 +115,15 @@ class SRBatch:
     phase: Tensor
     objects: ObjectBatch | None = None
 
-    def to(self, device: torch.device | str) -> "SRBatch":
+    def to(self, device: torch.device | str) -> "DecisionBatch":
         """Copy every tensor to a device."""
         copies: dict[str, Any] = {}
         for f in fields(self):
             value = getattr(self, f.name)
             copies[f.name] = None if value is None else value.to(device)
-        return SRBatch(**copies)
+        return DecisionBatch(**copies)
 
-    def take_points(self, order: Int[Tensor, "batch points"]) -> "SRBatch":
+    def take_points(self, order: Int[Tensor, "batch points"]) -> "DecisionBatch":
         """Reorder the points of every decision.
 
         Args:
@@ -148,7 +148,7 @@ def make_sample(
     config: NetworkConfig,
     *,
     chosen: Int[np.ndarray, " M"] | None = None,
-) -> SRSample:
+) -> DecisionSample:
     """Thin the cloud and normalise positions to the workspace.
 
     Args:
@@ -183,7 +183,7 @@ def make_sample(
         objects = objects.normalised(center, half)
     poses = candidates.as_pose7()
     poses[:, :3] = (candidates.positions - center) / half
-    return SRSample(
+    return DecisionSample(
         positions=(observation.points[chosen] - center) / half,
         features=observation.features[chosen],
         similarity=observation.similarity[chosen],
@@ -215,7 +215,7 @@ def choose_points(observation: Observation, config: NetworkConfig) -> Int[np.nda
     )
 
 
-def collate(samples: Sequence[SRSample]) -> SRBatch:
+def collate(samples: Sequence[DecisionSample]) -> DecisionBatch:
     """Pad decisions to common sizes.
 
     Args:
@@ -235,7 +235,7 @@ def collate(samples: Sequence[SRSample]) -> SRBatch:
     positions, point_mask = pad([sample.positions for sample in samples])
     tokens, token_mask = pad([sample.tokens for sample in samples])
     poses, candidate_mask = pad([sample.poses for sample in samples])
-    return SRBatch(
+    return DecisionBatch(
         positions=positions,
         features=pad([sample.features for sample in samples])[0],
         similarity=pad([sample.similarity for sample in samples])[0],

@@ -23,7 +23,7 @@ _INITIAL_MASK_WEIGHT = 6.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class SROutput:
+class NetworkOutput:
     """What the network says about every candidate of a batch.
 
     Attributes:
@@ -112,7 +112,7 @@ class ActionDecoder(nn.Module):
         nn.init.zeros_(self.rotation.weight)
         nn.init.zeros_(self.rotation.bias)
 
-    def forward(self, states: Float[Tensor, "batch candidates width"]) -> SROutput:
+    def forward(self, states: Float[Tensor, "batch candidates width"]) -> NetworkOutput:
         """Read out every candidate; the caller uses the row of the chosen one.
 
         Args:
@@ -125,7 +125,7 @@ class ActionDecoder(nn.Module):
         raw = self.rotation(hidden)
         # Smooth at zero, and never longer than the limit.
         rotvec = self.max_refinement_rad * raw / (1 + raw.square().sum(-1, keepdim=True)).sqrt()
-        return SROutput(
+        return NetworkOutput(
             # The argument of the softmax that gives w(a_k | I, L) in eq. (13) and (14).
             logits=states @ self.query / math.sqrt(len(self.query)),
             rotvec_tool=rotvec,

@@ -12,12 +12,12 @@ from torch.nn import functional
 from policy.arrays import check_range, checked_array
 from policy.errors import InvalidArrayError
 from policy.network.config import NetworkConfig
-from policy.network.decoder import SROutput
+from policy.network.decoder import NetworkOutput
 from policy.network.padding import pad
 
 
 @dataclass(frozen=True, kw_only=True)
-class SRTarget:
+class ExpertTarget:
     """What the expert says about the candidates of one decision.
 
     Attributes:
@@ -61,7 +61,7 @@ class SRTarget:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SRTargetBatch:
+class ExpertTargetBatch:
     """Targets of B decisions, padded to K candidates.
 
     Attributes:
@@ -76,12 +76,12 @@ class SRTargetBatch:
     avoid_collision: Tensor
     rotvec_tool: Tensor
 
-    def to(self, device: torch.device | str) -> "SRTargetBatch":
+    def to(self, device: torch.device | str) -> "ExpertTargetBatch":
         """Copy every tensor to a device."""
-        return SRTargetBatch(**{f.name: getattr(self, f.name).to(device) for f in fields(self)})
+        return ExpertTargetBatch(**{f.name: getattr(self, f.name).to(device) for f in fields(self)})
 
 
-def collate_targets(targets: Sequence[SRTarget]) -> SRTargetBatch:
+def collate_targets(targets: Sequence[ExpertTarget]) -> ExpertTargetBatch:
     """Pad the targets of several decisions, as `collate` pads the decisions.
 
     Args:
@@ -95,7 +95,7 @@ def collate_targets(targets: Sequence[SRTarget]) -> SRTargetBatch:
     """
     if not targets:
         raise InvalidArrayError("targets: got 0, expected at least 1.")
-    return SRTargetBatch(
+    return ExpertTargetBatch(
         positive=pad([target.positive for target in targets])[0],
         opening_m=pad([target.opening_m for target in targets])[0],
         avoid_collision=pad([target.avoid_collision for target in targets])[0],
@@ -131,7 +131,7 @@ def choice_loss(
 
 
 def decoding_loss(
-    output: SROutput, targets: SRTargetBatch, config: NetworkConfig
+    output: NetworkOutput, targets: ExpertTargetBatch, config: NetworkConfig
 ) -> Float[Tensor, ""]:
     """Loss of the action parameters on the positive candidates.
 
@@ -154,22 +154,3 @@ def decoding_loss(
     total = opening + rotation.square().sum(dim=-1) + avoid
     weight = targets.positive / targets.positive.sum(dim=1, keepdim=True)
     return (total * weight).sum(dim=1).mean()
-
-
-def sr_loss(
-    output: SROutput, targets: SRTargetBatch, config: NetworkConfig, *, decoding_weight: float = 0.1
-) -> Float[Tensor, ""]:
-    """The training objective.
-
-    Args:
-        output: What the network said.
-        targets: What the expert did.
-        config: Ranges of the outputs.
-        decoding_weight: Weight of the action parameters. Small, so that the choice of the
-            candidate, the paper's only objective, shapes the shared features.
-
-    Returns:
-        Eq. (15) plus the weighted loss of the action parameters.
-    """
-    choice = choice_loss(output.logits, targets.positive)
-    return choice + decoding_weight * decoding_loss(output, targets, config)

@@ -14,10 +14,10 @@ from policy.network.alignment import (
     scaled_similarity,
 )
 from policy.network.base import CandidateNetwork
-from policy.network.batch import SRBatch
+from policy.network.batch import DecisionBatch
 from policy.network.bias import position_basis
 from policy.network.config import SRConfig
-from policy.network.decoder import ActionDecoder, CandidateEvidence, SROutput
+from policy.network.decoder import ActionDecoder, CandidateEvidence, NetworkOutput
 from policy.network.dssa import DSSALayer
 from policy.network.encoder import EncoderLayer
 from policy.network.encoding import fourier_features, num_fourier_features
@@ -59,7 +59,7 @@ class SRNetwork(CandidateNetwork):
         self.decoder = ActionDecoder(config)
         self.evidence = CandidateEvidence(config)
 
-    def forward(self, batch: SRBatch) -> SROutput:
+    def forward(self, batch: DecisionBatch) -> NetworkOutput:
         """Score the candidates of a batch of decisions.
 
         Args:
@@ -83,7 +83,7 @@ class SRNetwork(CandidateNetwork):
         logits = output.logits + self.evidence(phase, batch.prior, readout)
         return replace(output, logits=logits.masked_fill(~batch.candidate_mask, float("-inf")))
 
-    def semantic_mask(self, batch: SRBatch) -> Float[Tensor, "batch heads points"]:
+    def semantic_mask(self, batch: DecisionBatch) -> Float[Tensor, "batch heads points"]:
         """How much each point matters to the instruction.
 
         Args:
@@ -110,7 +110,7 @@ class SRNetwork(CandidateNetwork):
         return torch.stack(rows) if rows else torch.zeros(0, 2)
 
     def _values(
-        self, batch: SRBatch, mask: Float[Tensor, "batch heads points"]
+        self, batch: DecisionBatch, mask: Float[Tensor, "batch heads points"]
     ) -> Float[Tensor, "batch points width"]:
         """V_align of eq. (6)."""
         x = self.visual(batch.features)

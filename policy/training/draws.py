@@ -8,8 +8,8 @@ import numpy as np
 from torch import Tensor
 
 from policy.demonstrations import Decision
-from policy.network.batch import SRBatch, SRSample, collate, make_sample
-from policy.network.loss import SRTarget, SRTargetBatch, collate_targets
+from policy.network.batch import DecisionBatch, DecisionSample, collate, make_sample
+from policy.network.loss import ExpertTarget, ExpertTargetBatch, collate_targets
 from policy.network.padding import pad
 from policy.training.augmentation import augment
 from policy.training.config import PickPositives, TrainConfig
@@ -26,8 +26,8 @@ class Example:
         valid: (K,) bool, the candidates that count as a success.
     """
 
-    sample: SRSample
-    target: SRTarget
+    sample: DecisionSample
+    target: ExpertTarget
     valid: np.ndarray
 
 
@@ -41,8 +41,8 @@ class ExampleBatch:
         valid: (B, K) bool, False on padding.
     """
 
-    inputs: SRBatch
-    targets: SRTargetBatch
+    inputs: DecisionBatch
+    targets: ExpertTargetBatch
     valid: Tensor
 
     def __len__(self) -> int:
@@ -165,7 +165,9 @@ def kept_candidates(
     return np.sort(np.append(chosen, executed))
 
 
-def make_target(decision: Decision, kept: np.ndarray, pick_positives: PickPositives) -> SRTarget:
+def make_target(
+    decision: Decision, kept: np.ndarray, pick_positives: PickPositives
+) -> ExpertTarget:
     """Say what the expert says about candidates.
 
     Args:
@@ -181,7 +183,7 @@ def make_target(decision: Decision, kept: np.ndarray, pick_positives: PickPositi
         positive = kept == decision.executed
     else:
         positive = decision.valid[kept]
-    return SRTarget(
+    return ExpertTarget(
         positive=positive,
         opening_m=decision.candidates.width_m[kept],
         avoid_collision=decision.avoid_collision[kept],

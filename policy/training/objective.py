@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from policy.network.base import CandidateNetwork
-from policy.network.decoder import SROutput
+from policy.network.decoder import NetworkOutput
 from policy.network.loss import choice_loss, decoding_loss
 from policy.training.config import Precision
 from policy.training.draws import ExampleBatch
@@ -67,7 +67,7 @@ class Objective(nn.Module):
         loss = choice + self.decoding_weight * decoding
         return Terms(loss, choice.detach(), decoding.detach(), valid, top1)
 
-    def score(self, batch: ExampleBatch) -> SROutput:
+    def score(self, batch: ExampleBatch) -> NetworkOutput:
         """Run the network; losses are computed in single precision whatever it runs in.
 
         Args:
@@ -79,7 +79,7 @@ class Objective(nn.Module):
         device = batch.valid.device.type
         with torch.autocast(device, torch.bfloat16, enabled=self.dtype == torch.bfloat16):
             output = self.network(batch.inputs)
-        return SROutput(
+        return NetworkOutput(
             logits=output.logits.float(),
             rotvec_tool=output.rotvec_tool.float(),
             opening_m=output.opening_m.float(),

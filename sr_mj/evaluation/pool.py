@@ -20,8 +20,8 @@ def run_episodes(
 ) -> Generator[Done]:
     """Run episodes.
 
-    Episodes that begin alike (`Episode.beginning`) are given to the same process, one after another,
-    as they share that. Each process has one thread, whatever their number: sums then add
+    Episodes that begin alike (`Episode.beginning`) are given to the same process, one after
+    another, as they share that. Each process has one thread, whatever their number: sums then add
     up in the same order, and the same episode gives the same line everywhere. An episode whose
     process dies again and again counts as a failure.
 

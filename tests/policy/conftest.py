@@ -15,8 +15,8 @@ from policy.observation import Observation
 # What is imported here is imported before shapes are checked: the networks come in fixtures.
 if TYPE_CHECKING:
     from policy.network.base import CandidateNetwork
-    from policy.network.batch import SRSample
-    from policy.network.loss import SRTargetBatch
+    from policy.network.batch import DecisionSample
+    from policy.network.loss import ExpertTargetBatch
 
 # Shapes in annotations are checked in the modules that compute. The containers and configurations
 # check themselves; their own messages are tested, which a type checker in front would hide.
@@ -51,8 +51,8 @@ CHANNELS = 16
 ObservationMaker = Callable[..., Observation]
 CandidatesMaker = Callable[..., ActionCandidates]
 ConfigMaker = Callable[..., Any]
-SampleMaker = Callable[[NetworkConfig], list["SRSample"]]
-TargetMaker = Callable[[list["SRSample"]], "SRTargetBatch"]
+SampleMaker = Callable[[NetworkConfig], list["DecisionSample"]]
+TargetMaker = Callable[[list["DecisionSample"]], "ExpertTargetBatch"]
 NetworkMaker = Callable[[NetworkConfig], "CandidateNetwork"]
 
 # Switches of what the paper does not have.
@@ -184,7 +184,7 @@ def make_samples(
     """Makes three decisions of different sizes, two picks and a place."""
     from policy.network.batch import make_sample
 
-    def make(config: NetworkConfig) -> list["SRSample"]:
+    def make(config: NetworkConfig) -> list["DecisionSample"]:
         sizes = [(40, 5, 7, "pick"), (23, 2, 3, "place"), (64, 8, 1, "pick")]
         return [
             make_sample(
@@ -201,13 +201,13 @@ def make_samples(
 @pytest.fixture
 def make_targets(rng: np.random.Generator) -> TargetMaker:
     """Makes what the network should have said of each decision."""
-    from policy.network.loss import SRTarget, collate_targets
+    from policy.network.loss import ExpertTarget, collate_targets
 
-    def make(samples: list["SRSample"]) -> "SRTargetBatch":
+    def make(samples: list["DecisionSample"]) -> "ExpertTargetBatch":
         targets = []
         for num in (len(sample.poses) for sample in samples):
             targets.append(
-                SRTarget(
+                ExpertTarget(
                     positive=np.arange(num) == rng.integers(num),
                     opening_m=rng.uniform(0, 0.085, num),
                     avoid_collision=rng.integers(0, 2, num),

@@ -11,7 +11,7 @@ from policy.network.alignment import (
     scaled_similarity,
 )
 from policy.network.attention import masked_softmax
-from policy.network.batch import SRBatch
+from policy.network.batch import DecisionBatch
 from policy.network.bias import candidate_basis
 from policy.network.config import SRConfig
 from policy.network.encoding import fourier_features
@@ -23,14 +23,14 @@ def _unit(x: torch.Tensor) -> torch.Tensor:
     return x / x.norm(dim=-1, keepdim=True)
 
 
-def _batch() -> SRBatch:
+def _batch() -> DecisionBatch:
     generator = torch.Generator().manual_seed(0)
 
     def randn(*shape: int) -> torch.Tensor:
         return torch.randn(*shape, generator=generator, dtype=torch.float64)
 
     poses = torch.cat([randn(2, CANDIDATES, 3) / 3, _unit(randn(2, CANDIDATES, 4))], dim=-1)
-    return SRBatch(
+    return DecisionBatch(
         positions=randn(2, POINTS, 3).clamp(-1, 1),
         features=_unit(randn(2, POINTS, CHANNELS)),
         similarity=randn(2, POINTS),

@@ -7,13 +7,14 @@ import pytest
 import torch
 
 from policy.network import kinds
-from policy.network.batch import SRSample, collate, make_sample
+from policy.network.batch import DecisionSample, collate, make_sample
 from policy.network.config import NetworkConfig, SRConfig
-from policy.network.loss import sr_loss
+from policy.network.decoder import NetworkOutput
+from policy.network.loss import ExpertTargetBatch, choice_loss, decoding_loss
 
 
 @pytest.fixture
-def samples(make_samples, any_config: NetworkConfig) -> list[SRSample]:
+def samples(make_samples, any_config: NetworkConfig) -> list[DecisionSample]:
     return make_samples(any_config)
 
 
@@ -21,8 +22,13 @@ def _same(got: torch.Tensor, expected: torch.Tensor) -> None:
     torch.testing.assert_close(got, expected, rtol=0, atol=2e-5)
 
 
+def _loss(output: NetworkOutput, targets: ExpertTargetBatch, config: NetworkConfig) -> torch.Tensor:
+    """Sum two terms, which together reach every output."""
+    return choice_loss(output.logits, targets.positive) + decoding_loss(output, targets, config)
+
+
 def test_padding_changes_nothing(
-    any_config: NetworkConfig, samples: list[SRSample], make_network
+    any_config: NetworkConfig, samples: list[DecisionSample], make_network
 ) -> None:
     network = make_network(any_config)
     together = network(collate(samples))
@@ -34,7 +40,7 @@ def test_padding_changes_nothing(
 
 
 def test_content_of_padding_changes_nothing(
-    any_config: NetworkConfig, samples: list[SRSample], make_network
+    any_config: NetworkConfig, samples: list[DecisionSample], make_network
 ) -> None:
     network, batch = make_network(any_config), collate(samples)
     objects = batch.objects
@@ -61,7 +67,7 @@ def test_content_of_padding_changes_nothing(
 
 
 def test_candidates_permute_with_their_scores(
-    any_config: NetworkConfig, samples: list[SRSample], make_network
+    any_config: NetworkConfig, samples: list[DecisionSample], make_network
 ) -> None:
     network, batch = make_network(any_config), collate(samples[:1])
     order = torch.randperm(7, generator=torch.Generator().manual_seed(0))
@@ -70,11 +76,11 @@ def test_candidates_permute_with_their_scores(
 
 
 def test_gradient_reaches_every_parameter(
-    any_config: NetworkConfig, samples: list[SRSample], make_targets
+    any_config: NetworkConfig, samples: list[DecisionSample], make_targets
 ) -> None:
     torch.manual_seed(0)
     network = kinds.make_network(any_config)
-    sr_loss(network(collate(samples)), make_targets(samples), any_config).backward()
+    _loss(network(collate(samples)), make_targets(samples), any_config).backward()
     dead = [
         name
         for name, parameter in network.named_parameters()
@@ -89,13 +95,13 @@ def test_gradient_reaches_every_parameter(
 
 
 def test_half_precision_gives_nearly_the_same(
-    any_config: NetworkConfig, samples: list[SRSample], make_network, make_targets
+    any_config: NetworkConfig, samples: list[DecisionSample], make_network, make_targets
 ) -> None:
     network, batch = make_network(any_config), collate(samples)
     with torch.autocast("cpu", torch.bfloat16):
         half = network(batch)
     torch.testing.assert_close(half.logits.float(), network(batch).logits, rtol=0, atol=0.1)
-    sr_loss(half, make_targets(samples), any_config).backward()
+    _loss(half, make_targets(samples), any_config).backward()
     assert all(p.grad is not None and p.grad.isfinite().all() for p in network.parameters())
 
 

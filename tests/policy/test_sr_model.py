@@ -6,20 +6,20 @@ import pytest
 import torch
 
 from policy.actions import ActionCandidates, ActionScores
-from policy.network.batch import SRBatch, SRSample, collate, make_sample
+from policy.network.batch import DecisionBatch, DecisionSample, collate, make_sample
 from policy.network.config import SRConfig
-from policy.network.loss import sr_loss
+from policy.network.loss import choice_loss
 from policy.network.model import SRNetwork
 from policy.observation import Observation
 
 
 @pytest.fixture
-def samples(make_samples, sr_config: SRConfig) -> list[SRSample]:
+def samples(make_samples, sr_config: SRConfig) -> list[DecisionSample]:
     return make_samples(sr_config)
 
 
 def test_order_of_points_changes_nothing(
-    sr_config: SRConfig, samples: list[SRSample], make_network
+    sr_config: SRConfig, samples: list[DecisionSample], make_network
 ) -> None:
     network, batch = make_network(sr_config), collate(samples)
     order = torch.randperm(64, generator=torch.Generator().manual_seed(0)).expand(3, -1)
@@ -29,7 +29,7 @@ def test_order_of_points_changes_nothing(
 
 
 def test_candidates_are_independent_unless_asked(
-    sr_config: SRConfig, samples: list[SRSample], make_network
+    sr_config: SRConfig, samples: list[DecisionSample], make_network
 ) -> None:
     network, batch = make_network(sr_config), collate(samples[:1])
     poses = batch.poses.clone()
@@ -40,13 +40,13 @@ def test_candidates_are_independent_unless_asked(
     assert (change[0, 1:].abs() > 1e-4).all()
 
 
-def _changed_logits(network: SRNetwork, batch: SRBatch, **changes: torch.Tensor) -> float:
+def _changed_logits(network: SRNetwork, batch: DecisionBatch, **changes: torch.Tensor) -> float:
     difference = network(replace(batch, **changes)).logits - network(batch).logits
     return difference[batch.candidate_mask].abs().max().item()
 
 
 def test_scores_depend_on_every_input(
-    sr_config: SRConfig, samples: list[SRSample], make_network
+    sr_config: SRConfig, samples: list[DecisionSample], make_network
 ) -> None:
     network, batch = make_network(sr_config), collate(samples)
     assert _changed_logits(network, batch, phase=1 - batch.phase) > 1e-4
@@ -79,7 +79,7 @@ def test_one_point(
 
 
 def test_outputs_stay_in_their_ranges(
-    sr_config: SRConfig, samples: list[SRSample], make_network
+    sr_config: SRConfig, samples: list[DecisionSample], make_network
 ) -> None:
     network = make_network(sr_config)
     with torch.no_grad():
@@ -91,7 +91,7 @@ def test_outputs_stay_in_their_ranges(
 
 
 def test_no_rotation_is_refined_before_training(
-    sr_config: SRConfig, samples: list[SRSample]
+    sr_config: SRConfig, samples: list[DecisionSample]
 ) -> None:
     assert not SRNetwork(sr_config)(collate(samples)).rotvec_tool.any()
 
@@ -187,7 +187,7 @@ def test_fits_a_handful_of_decisions(
     optimizer = torch.optim.Adam(network.parameters(), lr=3e-3)
     losses = []
     for _ in range(80):
-        loss = sr_loss(network(batch), targets, config, decoding_weight=0.0)
+        loss = choice_loss(network(batch).logits, targets.positive)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()

@@ -3,7 +3,6 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from models.tabletop import BIN_CENTER, BIN_HALF_M
 from models.ur5 import HOME_QPOS
@@ -26,19 +25,22 @@ def banana_scene():
     return make_scene(SceneConfig(scene="single", objects=("banana",), seed=5))
 
 
-def plan_at(planner, position, yaw=0.0, width_m=0.05):
-    pose = np.eye(4)
-    pose[:3, :3] = (Rotation.from_euler("z", yaw) * Rotation.from_euler("x", np.pi)).as_matrix()
-    pose[:3, 3] = position
-    candidates = ActionCandidates(
-        kind="pick",
-        Ts_world_tool=pose[None],
-        width_m=np.array([width_m], np.float32),
-        prior=np.ones(1, np.float32),
-    )
-    plan = planner.plan(candidates, np.array([0]))
-    assert plan is not None
-    return plan
+@pytest.fixture
+def plan_at(planner, pose_down):
+    """Plans to grasp at a position, straight from above."""
+
+    def make(position, yaw=0.0, width_m=0.05):
+        candidates = ActionCandidates(
+            kind="pick",
+            Ts_world_tool=pose_down(*position, yaw)[None],
+            width_m=np.array([width_m], np.float32),
+            prior=np.ones(1, np.float32),
+        )
+        plan = planner.plan(candidates, np.array([0]))
+        assert plan is not None
+        return plan
+
+    return make
 
 
 def place_plan_at(planner, scene, executor, xy, height_m):
@@ -70,12 +72,12 @@ def with_goal(scene, relation, reference="tuna_can", targets=("block_cube",)):
     return replace(scene, goal=Goal(text="", targets=targets, place=place))
 
 
-def grasp_cube(planner, scene, executor):
+def grasp_cube(plan_at, scene, executor):
     item = find_object(scene, "block_cube")
     pose = scene.T_world_object("block_cube")
     yaw = np.arctan2(pose[1, 0], pose[0, 0])
     center = scene.data.xipos[item.body.body_id]
-    return executor.execute(plan_at(planner, center, yaw), keep_target=True)
+    return executor.execute(plan_at(center, yaw), keep_target=True)
 
 
 def banana_grasp(scene):
@@ -88,9 +90,9 @@ def banana_grasp(scene):
     return middle.mean(axis=0), np.arctan2(along[1], along[0]) + np.pi / 2
 
 
-def test_a_good_grasp_holds_and_ends_in_the_bin(planner, banana_scene):
+def test_a_good_grasp_holds_and_ends_in_the_bin(plan_at, banana_scene):
     position, yaw = banana_grasp(banana_scene)
-    outcome = Executor(banana_scene).execute(plan_at(planner, position, yaw))
+    outcome = Executor(banana_scene).execute(plan_at(position, yaw))
     assert outcome.reason is Reason.GRASPED_TARGET
     assert outcome.success and outcome.grasped == "banana"
     resting = banana_scene.data.xipos[banana_scene.objects[0].body.body_id]
@@ -101,29 +103,29 @@ def test_a_good_grasp_holds_and_ends_in_the_bin(planner, banana_scene):
     )
 
 
-def test_closing_on_air_is_an_empty_close_and_moves_nothing(planner, banana_scene):
+def test_closing_on_air_is_an_empty_close_and_moves_nothing(plan_at, banana_scene):
     before = banana_scene.T_world_object("banana")
     center = banana_scene.data.xipos[banana_scene.objects[0].body.body_id]
     away = np.array([0.3 if center[0] > 0.5 else 0.7, -0.18 if center[1] > 0 else 0.18, 0.05])
-    outcome = Executor(banana_scene).execute(plan_at(planner, away))
+    outcome = Executor(banana_scene).execute(plan_at(away))
     assert outcome.reason is Reason.EMPTY_CLOSE and not outcome.success
     np.testing.assert_allclose(banana_scene.T_world_object("banana"), before, atol=2e-3)
     np.testing.assert_allclose(banana_scene.data.qpos[:6], HOME_QPOS, atol=5e-3)
 
 
-def test_an_object_that_was_not_asked_for_is_no_success(planner):
+def test_an_object_that_was_not_asked_for_is_no_success(plan_at):
     scene = make_scene(
         SceneConfig(scene="single", objects=("banana",), seed=5, goal="give me the violin")
     )
     position, yaw = banana_grasp(scene)
-    outcome = Executor(scene).execute(plan_at(planner, position, yaw))
+    outcome = Executor(scene).execute(plan_at(position, yaw))
     assert outcome.reason is Reason.GRASPED_OTHER
     assert not outcome.success and outcome.grasped == "banana"
 
 
-def test_the_arm_tracks_its_trajectory_to_a_millimetre(planner):
+def test_the_arm_tracks_its_trajectory_to_a_millimetre(planner, plan_at):
     scene = make_scene(SceneConfig(scene="empty"))
-    plan = plan_at(planner, (0.5, 0.1, 0.06))
+    plan = plan_at((0.5, 0.1, 0.06))
     errors = []
 
     def compare(scene):
@@ -143,44 +145,44 @@ def test_the_arm_tracks_its_trajectory_to_a_millimetre(planner):
     assert errors[-1] < 1e-3
 
 
-def test_an_obstacle_in_the_way_is_noticed(planner):
+def test_an_obstacle_in_the_way_is_noticed(plan_at):
     scene = make_scene(
         SceneConfig(scene="single", objects=("box",), seed=1, goal="give me the box")
     )
     center = scene.data.xipos[scene.objects[0].body.body_id]
     # Nearly closed fingers come down on the middle of the box.
-    outcome = Executor(scene).execute(plan_at(planner, (*center[:2], 0.025), width_m=0.0))
+    outcome = Executor(scene).execute(plan_at((*center[:2], 0.025), width_m=0.0))
     assert outcome.reason is Reason.APPROACH_COLLISION
     assert not outcome.success
     np.testing.assert_allclose(scene.data.qpos[:6], HOME_QPOS, atol=5e-3)
 
 
-def test_time_is_simulated_time(planner, banana_scene):
+def test_time_is_simulated_time(plan_at, banana_scene):
     position, yaw = banana_grasp(banana_scene)
     start = banana_scene.data.time
     steps = []
     outcome = Executor(banana_scene, on_step=lambda scene: steps.append(scene.data.time)).execute(
-        plan_at(planner, position, yaw)
+        plan_at(position, yaw)
     )
     assert len(steps) == outcome.num_steps
     assert steps[-1] - start == pytest.approx(outcome.simulated_s, abs=1e-3)
     assert np.all(np.diff(steps) > 0)
 
 
-def test_execution_repeats_bit_for_bit(planner):
+def test_execution_repeats_bit_for_bit(plan_at):
     results = []
     for _ in range(2):
         scene = make_scene(SceneConfig(scene="single", objects=("banana",), seed=5))
         position, yaw = banana_grasp(scene)
-        Executor(scene).execute(plan_at(planner, position, yaw))
+        Executor(scene).execute(plan_at(position, yaw))
         results.append(scene.data.qpos.tobytes())
     assert results[0] == results[1]
 
 
-def test_a_target_to_be_placed_stays_in_the_gripper_over_the_bin(planner, cube_scene):
+def test_a_target_to_be_placed_stays_in_the_gripper_over_the_bin(plan_at, cube_scene):
     scene = with_goal(cube_scene, "on")
     executor = Executor(scene)
-    outcome = grasp_cube(planner, scene, executor)
+    outcome = grasp_cube(plan_at, scene, executor)
     assert outcome.reason is Reason.GRASPED_TARGET and outcome.reward == 1
     assert object_in_gripper(scene) == "block_cube" and executor.drive.feels_object
     tool = executor.drive.T_world_tool[:3, 3]
@@ -188,20 +190,20 @@ def test_a_target_to_be_placed_stays_in_the_gripper_over_the_bin(planner, cube_s
     assert tool[2] > 0.2
 
 
-def test_another_object_is_dropped_even_if_targets_are_kept(planner, cube_scene):
+def test_another_object_is_dropped_even_if_targets_are_kept(plan_at, cube_scene):
     scene = with_goal(cube_scene, "on", targets=("lemon",))
-    outcome = grasp_cube(planner, scene, Executor(scene))
+    outcome = grasp_cube(plan_at, scene, Executor(scene))
     assert outcome.reason is Reason.GRASPED_OTHER and -1 < outcome.reward < 0
     assert outcome.knocked_off == ()
     resting = scene.data.xipos[find_object(scene, "block_cube").body.body_id]
     assert np.all(np.abs(resting[:2] - BIN_CENTER[:2]) < BIN_HALF_M)
 
 
-def test_places_on_an_object(planner, cube_scene):
+def test_places_on_an_object(planner, plan_at, cube_scene):
     scene = with_goal(cube_scene, "on")
     executor = Executor(scene)
     half = scene.data.xipos[find_object(scene, "block_cube").body.body_id][2]
-    assert grasp_cube(planner, scene, executor).success
+    assert grasp_cube(plan_at, scene, executor).success
     can = scene.data.xipos[find_object(scene, "tuna_can").body.body_id]
     height = 2 * can[2] + half + 0.01
     outcome = executor.execute(place_plan_at(planner, scene, executor, can[:2], height))
@@ -210,11 +212,11 @@ def test_places_on_an_object(planner, cube_scene):
     np.testing.assert_allclose(scene.data.qpos[:6], HOME_QPOS, atol=5e-3)
 
 
-def test_what_touches_down_early_is_let_go_there(planner, cube_scene):
+def test_what_touches_down_early_is_let_go_there(planner, plan_at, cube_scene):
     scene = with_goal(cube_scene, "on")
     executor = Executor(scene)
     half = scene.data.xipos[find_object(scene, "block_cube").body.body_id][2]
-    assert grasp_cube(planner, scene, executor).success
+    assert grasp_cube(plan_at, scene, executor).success
     can = find_object(scene, "tuna_can").body.body_id
     before = scene.data.xipos[can].copy()
     # Three centimetres into the can.
@@ -228,11 +230,11 @@ def test_what_touches_down_early_is_let_go_there(planner, cube_scene):
     np.testing.assert_allclose(scene.data.qpos[:6], HOME_QPOS, atol=5e-3)
 
 
-def test_what_is_in_the_way_down_is_a_collision(planner, cube_scene):
+def test_what_is_in_the_way_down_is_a_collision(planner, plan_at, cube_scene):
     scene = with_goal(cube_scene, "near")
     executor = Executor(scene)
     half = scene.data.xipos[find_object(scene, "block_cube").body.body_id][2]
-    assert grasp_cube(planner, scene, executor).success
+    assert grasp_cube(plan_at, scene, executor).success
     can = scene.data.xipos[find_object(scene, "tuna_can").body.body_id].copy()
     # As if nobody had seen the can: down to the table beside its edge, half of the cube over it.
     plan = place_plan_at(planner, scene, executor, (can[0] + 0.03, can[1]), half)
@@ -242,11 +244,11 @@ def test_what_is_in_the_way_down_is_a_collision(planner, cube_scene):
     np.testing.assert_allclose(scene.data.qpos[:6], HOME_QPOS, atol=5e-3)
 
 
-def test_beside_is_not_on(planner, cube_scene):
+def test_beside_is_not_on(planner, plan_at, cube_scene):
     scene = with_goal(cube_scene, "on")
     executor = Executor(scene)
     half = scene.data.xipos[find_object(scene, "block_cube").body.body_id][2]
-    assert grasp_cube(planner, scene, executor).success
+    assert grasp_cube(plan_at, scene, executor).success
     near = place_region(scene, "near", "tuna_can", moved="block_cube", clearance_m=0.04)
     spot = near.sample(np.random.default_rng(0), 1)[0]
     outcome = executor.execute(place_plan_at(planner, scene, executor, spot, half + 0.005))
@@ -258,10 +260,10 @@ def test_beside_is_not_on(planner, cube_scene):
     np.testing.assert_allclose(resting, [*spot, half], atol=3e-3)
 
 
-def test_what_is_lost_on_the_way_was_not_placed(planner, cube_scene):
+def test_what_is_lost_on_the_way_was_not_placed(planner, plan_at, cube_scene):
     scene = with_goal(cube_scene, "near")
     executor = Executor(scene)
-    assert grasp_cube(planner, scene, executor).success
+    assert grasp_cube(plan_at, scene, executor).success
     near = place_region(scene, "near", "tuna_can", moved="block_cube", clearance_m=0.04)
     spot = near.sample(np.random.default_rng(0), 1)[0]
     plan = place_plan_at(planner, scene, executor, spot, 0.05)
@@ -279,9 +281,9 @@ def test_what_is_lost_on_the_way_was_not_placed(planner, cube_scene):
     np.testing.assert_allclose(scene.data.qpos[:6], HOME_QPOS, atol=5e-3)
 
 
-def test_an_object_lost_in_the_lift_is_felt(planner, banana_scene):
+def test_an_object_lost_in_the_lift_is_felt(plan_at, banana_scene):
     position, yaw = banana_grasp(banana_scene)
-    plan = plan_at(planner, position, yaw)
+    plan = plan_at(position, yaw)
     body = banana_scene.objects[0].body
     start = banana_scene.data.qpos[body.qpos].copy()
 
@@ -300,7 +302,7 @@ def test_an_object_lost_in_the_lift_is_felt(planner, banana_scene):
     np.testing.assert_allclose(banana_scene.data.qpos[:6], HOME_QPOS, atol=5e-3)
 
 
-def test_what_falls_off_the_table_meanwhile_is_counted(planner):
+def test_what_falls_off_the_table_meanwhile_is_counted(plan_at):
     scene = make_scene(SceneConfig(scene="place8", objects=(), seed=4, goal="give me the violin"))
     item = scene.objects[0]
     away = min(
@@ -318,6 +320,6 @@ def test_what_falls_off_the_table_meanwhile_is_counted(planner):
         push.step += 1
 
     push.step = 0
-    outcome = Executor(scene, on_step=push).execute(plan_at(planner, (*away, 0.06)))
+    outcome = Executor(scene, on_step=push).execute(plan_at((*away, 0.06)))
     assert outcome.reason is Reason.KNOCKED_OFF
     assert outcome.knocked_off == (item.name,) and not outcome.success

@@ -22,9 +22,9 @@ from sr_mj.cli import run_command
 if TYPE_CHECKING:
     from torch import nn
 
-    from policy.network.batch import SRBatch
+    from policy.network.batch import DecisionBatch
     from policy.network.config import SRConfig
-    from policy.network.loss import SRTargetBatch
+    from policy.network.loss import ExpertTargetBatch
 
 Variant = Literal["base", "sr-a", "sr"]
 
@@ -83,12 +83,12 @@ def least(work: Callable[[], object], runs: int, warm_up: int) -> tuple[float, f
     return min(walls), min(cpus)
 
 
-def make_batch(config: BenchConfig, size: int, points: int) -> "SRBatch":
+def make_batch(config: BenchConfig, size: int, points: int) -> "DecisionBatch":
     """Make decisions of random numbers, none of them padded."""
     import torch
     from torch.nn.functional import normalize
 
-    from policy.network.batch import SRBatch
+    from policy.network.batch import DecisionBatch
 
     generator = torch.Generator().manual_seed(0)
 
@@ -97,7 +97,7 @@ def make_batch(config: BenchConfig, size: int, points: int) -> "SRBatch":
 
     num_tokens, num = 12, config.candidates
     poses = torch.cat([randn(size, num, 3) / 3, normalize(randn(size, num, 4), dim=-1)], dim=-1)
-    return SRBatch(
+    return DecisionBatch(
         positions=torch.rand(size, points, 3, generator=generator) * 2 - 1,
         features=normalize(randn(size, points, config.channels), dim=-1),
         similarity=torch.rand(size, points, generator=generator),
@@ -113,14 +113,14 @@ def make_batch(config: BenchConfig, size: int, points: int) -> "SRBatch":
     )
 
 
-def make_targets(config: BenchConfig) -> "SRTargetBatch":
+def make_targets(config: BenchConfig) -> "ExpertTargetBatch":
     """Make targets for a training step."""
     import torch
 
-    from policy.network.loss import SRTargetBatch
+    from policy.network.loss import ExpertTargetBatch
 
     shape = (config.batch, config.candidates)
-    return SRTargetBatch(
+    return ExpertTargetBatch(
         positive=torch.arange(config.candidates).expand(shape) < 3,
         opening_m=torch.full(shape, 0.04),
         avoid_collision=torch.zeros(shape),
@@ -164,7 +164,7 @@ def _measure_steps(
 ) -> tuple[float, float]:
     import torch
 
-    from policy.network.loss import sr_loss
+    from policy.network.loss import choice_loss, decoding_loss
 
     batch, targets = make_batch(config, config.batch, points), make_targets(config)
     optimizer = torch.optim.Adam(network.parameters(), lr=1e-4)
@@ -174,7 +174,8 @@ def _measure_steps(
         with torch.autocast("cpu", torch.bfloat16, enabled=is_half):
             output = network(batch)
         optimizer.zero_grad()
-        sr_loss(output, targets, network_config).backward()
+        loss = choice_loss(output.logits, targets.positive)
+        (loss + 0.1 * decoding_loss(output, targets, network_config)).backward()
         optimizer.step()
 
     return least(step, config.steps, warm_up=1)

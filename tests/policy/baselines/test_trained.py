@@ -11,11 +11,11 @@ from policy.baselines.heads import BaselineConfig
 from policy.baselines.vlg import VLGConfig
 from policy.errors import InvalidArrayError, InvalidConfigError
 from policy.network.base import CandidateNetwork
-from policy.network.batch import SRBatch, SRSample, collate, make_sample
+from policy.network.batch import DecisionBatch, DecisionSample, collate, make_sample
 
 
 @pytest.fixture
-def samples(make_samples, baseline_config: BaselineConfig) -> list[SRSample]:
+def samples(make_samples, baseline_config: BaselineConfig) -> list[DecisionSample]:
     return make_samples(baseline_config)
 
 
@@ -39,7 +39,7 @@ def test_order_of_points_changes_nothing(
     torch.testing.assert_close(second, first, rtol=0, atol=2e-5)
 
 
-def _changes(network: CandidateNetwork, batch: SRBatch, **changes: Any) -> bool:
+def _changes(network: CandidateNetwork, batch: DecisionBatch, **changes: Any) -> bool:
     difference = network(replace(batch, **changes)).logits - network(batch).logits
     largest = difference[batch.candidate_mask].abs().max().item()
     assert largest == 0 or largest > 1e-5
@@ -47,7 +47,7 @@ def _changes(network: CandidateNetwork, batch: SRBatch, **changes: Any) -> bool:
 
 
 def test_scores_depend_on_what_they_should(
-    baseline_config: BaselineConfig, samples: list[SRSample], make_network
+    baseline_config: BaselineConfig, samples: list[DecisionSample], make_network
 ) -> None:
     config = baseline_config
     network, batch = make_network(config), collate(samples)
@@ -68,7 +68,7 @@ def test_scores_depend_on_what_they_should(
 
 
 def test_a_network_of_objects_needs_objects(
-    samples: list[SRSample], make_config, make_network
+    samples: list[DecisionSample], make_config, make_network
 ) -> None:
     batch = replace(collate(samples), objects=None)
     with pytest.raises(InvalidArrayError, match="objects: got a batch without, expected one made"):

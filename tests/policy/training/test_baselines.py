@@ -13,7 +13,7 @@ from policy.baselines.vlg import VLGConfig, VLGNetwork
 from policy.demonstrations import DemonstrationFolder
 from policy.errors import InvalidConfigError
 from policy.network.base import CandidateNetwork
-from policy.network.batch import SRSample, make_sample
+from policy.network.batch import DecisionSample, make_sample
 from policy.network.checkpoint import load_checkpoint
 from policy.training import plot
 from policy.training import store as store_module
@@ -101,7 +101,7 @@ def test_goes_on_where_it_stopped(make_train_config, tmp_path: Path) -> None:
         assert torch.equal(one, two)
 
 
-def _equal(one: SRSample, two: SRSample) -> None:
+def _equal(one: DecisionSample, two: DecisionSample) -> None:
     for name in ("positions", "features", "similarity", "poses", "prior", "tokens", "phrase"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     assert one.objects is not None and two.objects is not None

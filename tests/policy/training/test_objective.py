@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from policy.demonstrations import DemonstrationFolder
-from policy.network.loss import choice_loss, sr_loss
+from policy.network.loss import choice_loss, decoding_loss
 from policy.network.model import SRNetwork
 from policy.training.draws import ExampleBatch, ExampleDrawer, collate_examples
 from policy.training.objective import Objective, compute_dtype
@@ -23,10 +23,11 @@ def test_terms_are_those_of_the_loss(batch) -> None:
     network, examples = batch
     terms = Objective(network, 0.3, torch.float32)(examples)
     output = network(examples.inputs)
-    expected = sr_loss(output, examples.targets, network.config, decoding_weight=0.3)
-    loss = float(terms.loss.detach())
-    assert loss == pytest.approx(float(expected.detach()), rel=1e-6)
-    assert loss == pytest.approx(float(terms.choice) + 0.3 * float(terms.decoding), rel=1e-6)
+    choice = float(choice_loss(output.logits, examples.targets.positive).detach())
+    decoding = float(decoding_loss(output, examples.targets, network.config).detach())
+    assert float(terms.choice) == pytest.approx(choice, rel=1e-6)
+    assert float(terms.decoding) == pytest.approx(decoding, rel=1e-6) and decoding > 0
+    assert float(terms.loss.detach()) == pytest.approx(choice + 0.3 * decoding, rel=1e-6)
     assert float(terms.valid) == pytest.approx(
         float(choice_loss(output.logits.detach(), examples.valid))
     )

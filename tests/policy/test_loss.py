@@ -7,14 +7,13 @@ import torch
 
 from policy.errors import InvalidArrayError
 from policy.network.config import SRConfig
-from policy.network.decoder import SROutput
+from policy.network.decoder import NetworkOutput
 from policy.network.loss import (
-    SRTarget,
-    SRTargetBatch,
+    ExpertTarget,
+    ExpertTargetBatch,
     choice_loss,
     collate_targets,
     decoding_loss,
-    sr_loss,
 )
 
 INF = float("inf")
@@ -60,15 +59,15 @@ def test_no_positive_is_an_error() -> None:
     )
 
 
-def _output_and_targets() -> tuple[SROutput, SRTargetBatch, SRConfig]:
+def _output_and_targets() -> tuple[NetworkOutput, ExpertTargetBatch, SRConfig]:
     config = SRConfig(feature_dim=8, max_opening_m=0.1, max_refinement_rad=0.2)
-    output = SROutput(
+    output = NetworkOutput(
         logits=torch.zeros(1, 3),
         rotvec_tool=torch.tensor([[[0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [9.0, 9.0, 9.0]]]),
         opening_m=torch.tensor([[0.05, 0.02, 9.0]]),
         avoid_collision_logit=torch.tensor([[0.0, math.log(3.0), 9.0]]),
     )
-    targets = SRTargetBatch(
+    targets = ExpertTargetBatch(
         positive=torch.tensor([[True, True, False]]),
         opening_m=torch.tensor([[0.0, 0.02, 0.0]]),
         avoid_collision=torch.tensor([[1.0, 0.0, 0.0]]),
@@ -84,21 +83,14 @@ def test_decoding_loss_by_hand() -> None:
     assert loss.item() == pytest.approx((first + second) / 2, abs=1e-6)
 
 
-def test_objective_is_the_weighted_sum() -> None:
-    output, targets, config = _output_and_targets()
-    expected = -math.log(2 / 3) + 0.25 * decoding_loss(output, targets, config).item()
-    total = sr_loss(output, targets, config, decoding_weight=0.25)
-    assert total.item() == pytest.approx(expected, abs=1e-6)
-
-
-def _target(num_candidates: int = 3, **changes: Any) -> SRTarget:
+def _target(num_candidates: int = 3, **changes: Any) -> ExpertTarget:
     defaults = {
         "positive": np.arange(num_candidates) == 0,
         "opening_m": np.full(num_candidates, 0.04),
         "avoid_collision": np.zeros(num_candidates),
         "rotvec_tool": np.zeros((num_candidates, 3)),
     }
-    return SRTarget(**(defaults | changes))
+    return ExpertTarget(**(defaults | changes))
 
 
 def test_targets_are_padded_with_negatives() -> None:
