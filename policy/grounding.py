@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from jaxtyping import Float
 from scipy.spatial import KDTree
 
 from policy.actions import ActionCandidates, ActionScores
 from policy.errors import InvalidConfigError
 from policy.observation import Observation, PlaceSide
+from policy.similar_region import SmoothedSimilarity
 
 _POSITIVE = (
     "smoothing_radius_m", "pick_sigma_m", "place_sigma_m", "inside_sigma_m", "ring_m",
@@ -133,30 +132,31 @@ class GroundingPolicy:
     def _semantic_score(
         self, observation: Observation, candidates: ActionCandidates
     ) -> Float[np.ndarray, " K"]:
-        points = observation.points.astype(np.float64)
-        pairs = KDTree(points).query_pairs(self.config.smoothing_radius_m, output_type="ndarray")
-        smoothed = self._smooth(observation, pairs)
-        background = np.median(smoothed)
+        points, config = observation.points.astype(np.float64), self.config
+        similarity = SmoothedSimilarity(
+            points, observation.similarity, observation.confidence, config.smoothing_radius_m
+        )
+        smoothed, background = similarity.values, similarity.background
         if smoothed.max() - background < _MIN_CONTRAST:
             return np.zeros(len(candidates))
-        region = self._most_similar_region(smoothed, pairs)
+        region = similarity.best_region(config.region_level)
         if observation.side is not None:
-            grown = self._grow(region, smoothed, pairs)
+            grown = similarity.grow(region, config.grow_level)
             return self._place_score(points[grown, :2], observation.side, candidates)
         contrast = smoothed[region].mean() - background
         relevance = np.clip((smoothed - background) / contrast, -1.0, 1.0)
 
         offsets = candidates.positions[:, None] - points[None]
-        sigma_m = self.config.pick_sigma_m
+        sigma_m = config.pick_sigma_m
         if candidates.kind == "place":
             # The tool's height over the support depends on the object it holds; only the place on
             # the ground plan counts.
-            offsets, sigma_m = offsets[..., :2], self.config.place_sigma_m
+            offsets, sigma_m = offsets[..., :2], config.place_sigma_m
         squared = (offsets**2).sum(axis=-1)
         kernel = np.exp(-squared / (2 * sigma_m**2)) * observation.confidence
-        local = (kernel @ relevance) / (kernel.sum(axis=1) + self.config.min_support)
+        local = (kernel @ relevance) / (kernel.sum(axis=1) + config.min_support)
         nearness = np.exp(-squared[:, region].min(axis=1) / (2 * sigma_m**2))
-        weight = self.config.region_weight
+        weight = config.region_weight
         return weight * nearness + (1 - weight) * local
 
     def _place_score(
@@ -174,62 +174,3 @@ class GroundingPolicy:
             distance = KDTree(reference).query(positions)[0]
             deviation = (distance - config.ring_m) / config.ring_sigma_m
         return np.exp(-(deviation**2) / 2)
-
-    def _smooth(
-        self, observation: Observation, pairs: Int[np.ndarray, "M 2"]
-    ) -> Float[np.ndarray, " N"]:
-        """Average the similarity over neighbours, weighted by confidence and distance."""
-        points = observation.points.astype(np.float64)
-        distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
-        # Half the radius as sigma: neighbours at the rim weigh 0.14.
-        kernel = np.exp(-2 * (distance / self.config.smoothing_radius_m) ** 2)
-        # Points without confidence still need a value; a trace of weight gives them one.
-        weight = observation.confidence.astype(np.float64) + 1e-6
-        total, mass = weight * observation.similarity, weight.copy()
-        for here, there in (pairs.T, pairs.T[::-1]):
-            num_points = len(points)
-            neighbour = kernel * weight[there]
-            mass += np.bincount(here, neighbour, num_points)
-            total += np.bincount(here, neighbour * observation.similarity[there], num_points)
-        return total / mass
-
-    def _most_similar_region(
-        self, smoothed: Float[np.ndarray, " N"], pairs: Int[np.ndarray, "M 2"]
-    ) -> Int[np.ndarray, " R"]:
-        """Indices of the connected set of similar points with the most similarity in total."""
-        excess = smoothed - _threshold(smoothed, self.config.region_level)
-        is_high = excess >= 0
-        labels = _connected(is_high, pairs)
-        # Size and strength together: a lone outlier has no size, a broad faint area no excess.
-        mass = np.bincount(labels[is_high], excess[is_high], len(smoothed))
-        return np.flatnonzero(is_high & (labels == mass.argmax()))
-
-    def _grow(
-        self,
-        region: Int[np.ndarray, " R"],
-        smoothed: Float[np.ndarray, " N"],
-        pairs: Int[np.ndarray, "M 2"],
-    ) -> Int[np.ndarray, " G"]:
-        """Add the connected points of lesser similarity to a region."""
-        is_high = smoothed >= _threshold(smoothed, self.config.grow_level)
-        is_high[region] = True
-        labels = _connected(is_high, pairs)
-        return np.flatnonzero(is_high & (labels == labels[region[0]]))
-
-
-def _threshold(smoothed: Float[np.ndarray, " N"], level: float) -> float:
-    """Return the similarity at a share of the way from the median point to the best."""
-    background = float(np.median(smoothed))
-    return background + level * (float(smoothed.max()) - background)
-
-
-def _connected(
-    is_high: Bool[np.ndarray, " N"], pairs: Int[np.ndarray, "M 2"]
-) -> Int[np.ndarray, " N"]:
-    """Label the connected sets of the points that count; pairs are neighbours."""
-    edges = pairs[is_high[pairs].all(axis=1)]
-    graph = coo_array(
-        (np.ones(len(edges), dtype=bool), (edges[:, 0], edges[:, 1])),
-        shape=(len(is_high), len(is_high)),
-    )
-    return connected_components(graph, directed=False)[1]

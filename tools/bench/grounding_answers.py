@@ -13,8 +13,8 @@ from perception.encoders import load_encoder
 from perception.encoders.base import Encoder, TextFeatures
 from perception.language import parse_instruction
 from perception.text_scores import TextScorer
-from policy.grounding import GroundingPolicy
-from policy.observation import Observation
+from policy.grounding import GroundingConfig
+from policy.similar_region import SmoothedSimilarity, neighbour_pairs
 from tools.bench.grounding_scenes import BenchScene, Question, list_questions
 
 # Objects that fewer feature points lie on are hardly in sight: 10 voxels of 8 mm are 6 square
@@ -92,9 +92,8 @@ class Examiner:
         self._counts = np.bincount(self.owners[self.owners >= 0], minlength=len(bench.words))
         self.visible = np.flatnonzero(self._counts >= MIN_POINTS)
         self._tree = KDTree(cloud.points)
-        self._policy = GroundingPolicy()
-        radius_m = self._policy.config.smoothing_radius_m
-        self._pairs = self._tree.query_pairs(radius_m, output_type="ndarray")
+        self._config = GroundingConfig()
+        self._pairs = neighbour_pairs(cloud.points, self._config.smoothing_radius_m)
         self._answers: dict[str, tuple[int, int, int]] = {}
 
     def questions(self) -> list[Question]:
@@ -134,20 +133,11 @@ class Examiner:
 
     def _region(self, similarity: np.ndarray) -> np.ndarray:
         """Return the indices of the region that the grounding policy would act on."""
-        one = np.ones(1, np.float32)
-        observation = Observation(
-            points=self._cloud.points,
-            # Smoothing looks at similarity alone; real features would only be copied and checked.
-            features=np.ones((len(self._cloud), 1), np.float32),
-            similarity=similarity,
-            confidence=self._cloud.confidence,
-            text_tokens=one[None],
-            text_pooled=one,
-            workspace_min=np.array(self._bench.scene.workspace.lower),
-            workspace_max=np.array(self._bench.scene.workspace.upper),
+        cloud, config = self._cloud, self._config
+        smoothed = SmoothedSimilarity(
+            cloud.points, similarity, cloud.confidence, config.smoothing_radius_m, self._pairs
         )
-        smoothed = self._policy._smooth(observation, self._pairs)
-        return self._policy._most_similar_region(smoothed, self._pairs)
+        return smoothed.best_region(config.region_level)
 
 
 def examine(
