@@ -1,5 +1,7 @@
 """The privileged policy: it knows where every object is. The ceiling of every other policy."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -76,16 +78,48 @@ class OraclePolicy:
         targets = self._scene.goal.targets
         if not len(candidates) or not targets:
             return ActionScores(logits=candidates.prior)
-        names = list(self._surfaces)
-        grips = np.stack([self._points_between_fingers(n, candidates) for n in names])
-        gripped = np.array(names)[grips.argmax(axis=0)]
-        on_target = np.isin(gripped, targets) & (grips.max(axis=0) >= _MIN_POINTS)
-        gain = _ON_TARGET + _SHARED * ((grips >= _MIN_POINTS).sum(axis=0) > 1)
+        gripped, is_shared = self._grips(candidates)
+        on_target = np.isin(gripped, targets)
+        gain = _ON_TARGET + _SHARED * is_shared
         if self._scene.goal.place is not None:
-            gain = gain + _LEVER * self._levers(gripped, candidates)
-        distance = np.min([self._distance(name, candidates.positions) for name in targets], axis=0)
+            # What is not gripped has no lever; any name will do there.
+            held = np.where(on_target, gripped, targets[0])
+            gain = gain + _LEVER * self._levers(held, candidates)
+        distance = self.distances(targets, candidates.positions)
         bonus = np.where(on_target, gain, -10 * distance)
         return ActionScores(logits=(candidates.prior + bonus).astype(np.float32))
+
+    def gripped(self, candidates: ActionCandidates) -> np.ndarray:
+        """Tell what grasps would close on.
+
+        Args:
+            candidates: K grasps.
+
+        Returns:
+            (K,) names of objects; "" for nothing.
+        """
+        return self._grips(candidates)[0]
+
+    def distances(self, names: Sequence[str], positions: np.ndarray) -> np.ndarray:
+        """Measure how far points are from the nearest of some objects.
+
+        Args:
+            names: At least one object.
+            positions: (N, 3) world, metres.
+
+        Returns:
+            (N,) distances to the surface, metres.
+        """
+        trees = [KDTree(self._world_points(name)) for name in names]
+        return np.min([tree.query(positions)[0] for tree in trees], axis=0)
+
+    def _grips(self, candidates: ActionCandidates) -> tuple[np.ndarray, np.ndarray]:
+        """Return (K,) names of what grasps close on, "" for nothing, and whether on more too."""
+        names = list(self._surfaces)
+        counts = np.stack([self._points_between_fingers(name, candidates) for name in names])
+        is_gripped = counts >= _MIN_POINTS
+        most = np.array(names)[counts.argmax(axis=0)]
+        return np.where(is_gripped.any(axis=0), most, ""), is_gripped.sum(axis=0) > 1
 
     def _levers(self, names: np.ndarray, candidates: ActionCandidates) -> np.ndarray:
         """Rate (K,) in 0..1 the lever by which gravity turns each gripped object in the pads."""
@@ -111,7 +145,3 @@ class OraclePolicy:
             local = np.abs((points[indices] - pose[:3, 3]) @ pose[:3, :3])
             counts[row] = np.all(local <= (half_x[row], pad_y, pad_z), axis=1).sum()
         return counts
-
-    def _distance(self, name: str, positions: np.ndarray) -> np.ndarray:
-        """Return the distances (K,) of positions to an object's surface, metres."""
-        return KDTree(self._world_points(name)).query(positions)[0]

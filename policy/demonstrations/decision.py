@@ -95,11 +95,13 @@ class Decision:
         wordings: The instruction, then its paraphrases; at least one.
         candidates: The K candidates that the expert chose among, all within the arm's reach.
         executed: Index of the candidate that was executed.
-        valid: (K,) bool, ground truth: a grasp closes on an object of the target set, a place lies
-            in a valid region.
+        valid: (K,) bool, ground truth: a grasp closes on an object of the target set, or, if it
+            clears, on the object that is in the way; a place lies in a valid region.
         avoid_collision: (K,) float32, 1 where the straight approach collides, else 0.
         expert_logits: (K,) float32 scores that the expert gave.
         seed: Seed of the scene that it was made in.
+        clears: Whether no candidate closes on a target, and a grasp was executed that takes away
+            what is in the way.
 
     Raises:
         InvalidArrayError: If a field has a wrong shape or value, or the fields don't fit.
@@ -115,6 +117,7 @@ class Decision:
     avoid_collision: np.ndarray
     expert_logits: np.ndarray
     seed: int
+    clears: bool = False
 
     def __post_init__(self) -> None:
         """Check the fields and replace the arrays by read-only copies."""
@@ -146,6 +149,8 @@ class Decision:
                 "the same."
             )
         is_place = self.phase == "place"
+        if is_place and self.clears:
+            raise InvalidArrayError("clears: got True for a place, expected it of grasps alone.")
         if is_place != (self.relation is not None) or is_place != (self.side is not None):
             raise InvalidArrayError(
                 f"relation and side: got {self.relation!r} and {self.side!r} in the {self.phase} "

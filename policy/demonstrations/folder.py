@@ -94,6 +94,11 @@ class DemonstrationFolder:
         return self._entries("phase")
 
     @cached_property
+    def clears(self) -> tuple[bool, ...]:
+        """Whether every demonstration takes away what is in the way of a target."""
+        return self._entries("clears")
+
+    @cached_property
     def num_candidates(self) -> tuple[int, ...]:
         """Number K of candidates of every demonstration."""
         return self._entries("num_candidates")

@@ -19,7 +19,7 @@ import numpy as np
 from policy.actions import ActionCandidates
 from policy.demonstrations.decision import Decision, Look, Wording
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 _HALF = np.float16
 _ARRAYS = ("avoid_collision", "expert_logits")
@@ -48,6 +48,7 @@ def fill(
             "phase": decision.phase,
             "relation": decision.relation,
             "side": decision.side,
+            "clears": decision.clears,
             "executed": decision.executed,
             "seed": decision.seed,
             "num_candidates": len(decision.candidates),
@@ -112,6 +113,7 @@ def read_decision(group: Any, entry: dict[str, Any]) -> Decision:
         phase=entry["phase"],
         relation=entry["relation"],
         side=entry["side"],
+        clears=entry["clears"],
         wordings=tuple(
             _read_wording(group[f"wordings/{number}"], text)
             for number, text in enumerate(entry["texts"])

@@ -55,6 +55,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
             {
                 "val_top1": "all",
                 "val_top1_pick": "pick",
+                "val_top1_clear": "clear",
                 "val_top1_place": "place",
             },
         )

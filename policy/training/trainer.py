@@ -200,8 +200,9 @@ class Trainer:
         row = {"step": progress.step, "epoch": progress.epoch, "seconds": progress.seconds}
         row |= {name: train.get(name, float("nan")) for name in _TRAIN_COLUMNS}
         log.add_epoch(row | metrics | branch_weights(self._kept_network()))
-        shown = ("val_loss", "val_valid", "val_top1", "val_top1_pick", "val_top1_place")
-        numbers = "  ".join(f"{name[4:]} {metrics[name]:.3f}" for name in shown if name in metrics)
+        shown = ("loss", "valid", "top1", "top1_pick", "top1_clear", "top1_place")
+        found = {name: metrics[f"val_{name}"] for name in shown if f"val_{name}" in metrics}
+        numbers = "  ".join(f"{name} {value:.3f}" for name, value in found.items())
         mark = "  best" if progress.bad_epochs == 0 else ""
         loss = f"train {train['train_choice']:.3f}  " if train else ""
         tqdm.write(f"epoch {progress.epoch:3d}  {loss}validation: {numbers}{mark}")

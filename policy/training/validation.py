@@ -16,7 +16,7 @@ from policy.training.objective import Objective
 from policy.training.order import sorted_batches
 from policy.training.statistics import gate_entropy
 
-_PHASES = ("pick", "place")
+_KINDS = ("pick", "clear", "place")
 _TERMS = ("loss", "valid", "top1", "decoding")
 
 
@@ -46,19 +46,20 @@ class Validator:
         Returns:
             `val_loss` (cross-entropy with the positives of training), `val_valid` (with all valid
             candidates as positives), `val_top1` (share of decisions whose best candidate is
-            valid), `val_decoding`; each also with `_pick` and `_place` where there are such
-            decisions; and `gate_entropy` for a network whose stage 1 makes a mask.
+            valid), `val_decoding`; each also with `_pick`, `_clear` (picks of what is in the way of
+            a target) and `_place` where there are such decisions; and `gate_entropy` for a network
+            whose stage 1 makes a mask.
         """
         was_training = objective.training
         objective.eval()
-        sums = torch.zeros(len(_PHASES), len(_TERMS) + 2, dtype=torch.float64)
+        sums = torch.zeros(len(_KINDS), len(_TERMS) + 2, dtype=torch.float64)
         with gate_entropy(objective.network) as entropy:
-            for phase, chosen in self._batches()[self.ranks.rank :: self.ranks.size]:
+            for kind, chosen in self._batches()[self.ranks.rank :: self.ranks.size]:
                 examples = [self.drawer.validation(int(index)) for index in chosen]
                 terms = objective(collate_examples(examples).to(self.ranks.device))
                 means = [terms.choice, terms.valid, terms.top1, terms.decoding]
                 row = torch.tensor([*map(float, means), entropy.value, 1.0], dtype=torch.float64)
-                sums[phase] += len(chosen) * row
+                sums[kind] += len(chosen) * row
         objective.train(was_training)
         return _report(self.ranks.sum(sums).cpu().numpy())
 
@@ -70,29 +71,33 @@ class Validator:
         """
         rng = np.random.default_rng(0)
         results: dict[str, dict[str, float]] = {}
-        phases = self.drawer.store.folder.phases
+        kinds = self._kinds()
         for policy in (GroundingPolicy(), RandomPolicy()):
-            hits = {phase: [] for phase in _PHASES}
+            hits = {kind: [] for kind in _KINDS}
             for index in self.indices:
                 demonstration = self.drawer.store.demonstration(int(index))
                 decision = demonstration.decision
                 scores = policy.score(demonstration.observation(), decision.candidates, rng)
-                hits[phases[index]].append(bool(decision.valid[scores.best]))
-            every = [hit for phase in _PHASES for hit in hits[phase]]
+                hits[str(kinds[index])].append(bool(decision.valid[scores.best]))
+            every = [hit for kind in _KINDS for hit in hits[kind]]
             results[policy.name] = {"val_top1": float(np.mean(every))} | {
-                f"val_top1_{phase}": float(np.mean(hits[phase])) for phase in _PHASES if hits[phase]
+                f"val_top1_{kind}": float(np.mean(hits[kind])) for kind in _KINDS if hits[kind]
             }
         return results
 
-    def _batches(self) -> list[tuple[int, np.ndarray]]:
-        """Batches of one phase each, so that phases can be told apart afterwards."""
+    def _kinds(self) -> np.ndarray:
+        """Return what every demonstration of the folder is, one of `_KINDS`."""
         folder = self.drawer.store.folder
-        phases = np.array(folder.phases)
+        return np.where(folder.clears, "clear", folder.phases)
+
+    def _batches(self) -> list[tuple[int, np.ndarray]]:
+        """Batches of one kind each, so that kinds can be told apart afterwards."""
+        folder, kinds = self.drawer.store.folder, self._kinds()
         return [
             (number, batch)
-            for number, phase in enumerate(_PHASES)
+            for number, kind in enumerate(_KINDS)
             for batch in sorted_batches(
-                self.indices[phases[self.indices] == phase], folder.num_candidates, batch=self.batch
+                self.indices[kinds[self.indices] == kind], folder.num_candidates, batch=self.batch
             )
         ]
 
@@ -111,12 +116,12 @@ def stop_score(metrics: dict[str, float], stop_on: StopOn) -> float:
     return -value if stop_on == "top1" else value
 
 
-def _report(sums: Float[np.ndarray, "phases columns"]) -> dict[str, float]:
+def _report(sums: Float[np.ndarray, "kinds columns"]) -> dict[str, float]:
     total = sums.sum(axis=0)
     report = {f"val_{term}": total[i] / total[-1] for i, term in enumerate(_TERMS)}
-    for phase, row in zip(_PHASES, sums, strict=True):
+    for kind, row in zip(_KINDS, sums, strict=True):
         if row[-1]:
-            report |= {f"val_{term}_{phase}": row[i] / row[-1] for i, term in enumerate(_TERMS)}
+            report |= {f"val_{term}_{kind}": row[i] / row[-1] for i, term in enumerate(_TERMS)}
     if not math.isnan(total[-2]):
         report["gate_entropy"] = total[-2] / total[-1]
     return {name: float(value) for name, value in report.items()}

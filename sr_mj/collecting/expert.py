@@ -21,10 +21,16 @@ from sr_mj.outcome import Outcome
 from sr_mj.pipeline import Pipeline, look, observe
 from sr_mj.planning import Plan
 from sr_mj.scene import Goal, Scene
+from sr_mj.scene.placement import find_object
 
 _VALID_LOGIT = 7.5
 """The oracle gives 8.5 or more where a candidate does what is asked for; up to 6.5 to a place
 inside the region from which the object fell when it was tried, and less than 2 elsewhere."""
+
+_ON_TARGET_M = 0.006
+_LEAST_IN_SIGHT = 5
+"""So many points of the cloud have to lie so near to a target for it to be in sight: of what is
+hidden altogether, nothing tells what hides it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,14 +57,18 @@ class Choice:
     """What the expert makes of a goal, before anything is executed.
 
     Attributes:
-        scene: The scene with that goal.
+        scene: The scene with that goal; if what is in the way has to be taken away first, with that
+            as its target.
         logits: (K,) float32 the expert's scores.
-        valid: (K,) whether a candidate does what is asked for.
+        valid: (K,) whether a candidate does what is asked for, or, if none does and this clears,
+            closes on what is in the way.
+        clears: Whether no candidate does what is asked for.
     """
 
     scene: Scene
     logits: np.ndarray
     valid: np.ndarray
+    clears: bool = False
 
     @property
     def order(self) -> np.ndarray:
@@ -127,16 +137,51 @@ class Expert:
         proposed = self.pipeline.placer.place(after, held, self._candidates)
         return self._seen(*found, proposed, held)
 
-    def choose(self, seen: Seen, goal: Goal, text: PhaseText) -> Choice | None:
-        """Score the candidates for a goal; None if none does what is asked for."""
+    def choose(
+        self, seen: Seen, goal: Goal, text: PhaseText, *, may_clear: bool = False
+    ) -> Choice | None:
+        """Score the candidates for a goal.
+
+        Args:
+            seen: What can be done.
+            goal: What is wanted.
+            text: The instruction.
+            may_clear: If no grasp closes on a target, but one is in sight that the gripper could
+                hold, choose what to take away first: what the grasp nearest to it closes on.
+
+        Returns:
+            The choice; None if no candidate does what is asked for.
+        """
         scene = replace(self.scene, goal=goal)
-        observation = observe(seen.percept, scene, text)
-        logits = OraclePolicy(scene).score(observation, seen.candidates, self._policy).logits
+        observation, oracle = observe(seen.percept, scene, text), OraclePolicy(scene)
+        logits = oracle.score(observation, seen.candidates, self._policy).logits
         valid = logits > _VALID_LOGIT
-        if not valid.any():
-            self.reasons["no_valid_candidate"] += 1
-            return None
-        return Choice(scene=scene, logits=logits, valid=valid)
+        if valid.any():
+            return Choice(scene=scene, logits=logits, valid=valid)
+        could_be = [n for n in goal.targets if find_object(scene, n).graspable]
+        if may_clear and could_be and _is_in_sight(could_be, oracle, seen):
+            gripped = oracle.gripped(seen.candidates)
+            obstacle = str(gripped[np.argmax(logits)])
+            if obstacle:
+                scene = replace(scene, goal=replace(goal, targets=(obstacle,)))
+                valid = gripped == obstacle
+                return Choice(scene=scene, logits=logits, valid=valid, clears=True)
+        self.reasons["no_valid_candidate"] += 1
+        return None
+
+    def blocked(self, seen: Seen) -> list[str]:
+        """List the objects that the gripper could hold and that are in sight, but not in reach.
+
+        Args:
+            seen: What can be done.
+
+        Returns:
+            Names of those that no grasp closes on.
+        """
+        oracle = OraclePolicy(self.scene)
+        gripped = set(oracle.gripped(seen.candidates))
+        could_be = [item.name for item in self.scene.objects if item.graspable]
+        return [n for n in could_be if n not in gripped and _is_in_sight([n], oracle, seen)]
 
     def plan(self, seen: Seen, order: np.ndarray) -> Plan | None:
         """Plan the first of some candidates that can be executed."""
@@ -189,6 +234,7 @@ class Expert:
             avoid_collision=seen.avoid_collision,
             expert_logits=choice.logits,
             seed=seed,
+            clears=choice.clears,
         )
         self.decisions.append((look, decision))
 
@@ -249,3 +295,9 @@ class Expert:
             phrase_pooled=observation.phrase_pooled,
             similarity=observation.similarity,
         )
+
+
+def _is_in_sight(names: Sequence[str], oracle: OraclePolicy, seen: Seen) -> bool:
+    """Tell whether the cloud shows one of some objects."""
+    distance_m = oracle.distances(names, seen.percept.features.points)
+    return int((distance_m < _ON_TARGET_M).sum()) >= _LEAST_IN_SIGHT

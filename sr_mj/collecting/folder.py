@@ -24,7 +24,7 @@ from sr_mj.provenance import git_revision, package_versions, to_json
 from sr_mj.scene import Scene
 
 # Changes whenever the same seed gives another scene, other goals, or other labels.
-RECIPE = 2
+RECIPE = 3
 
 _COMMON = "collection.json"
 _MARKER = ".none.json"

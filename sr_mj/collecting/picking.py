@@ -1,5 +1,6 @@
 """Decisions to pick: several goals from every state of a heap, which is cleared step by step."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,9 @@ _DRAWS_PER_GOAL = 3
 # So often an object is asked for by any of its names; otherwise as the protocol's templates do,
 # which have names for some of the objects only.
 _ANY_NAME = 0.3
+# So many goals of a look ask for what is in sight but cannot be gripped yet, if there is such a
+# thing. Of goals drawn at random one in fifteen does: too few to learn from.
+_GOALS_FOR_BLOCKED = 2
 # So often at most one grasp is stored with different instructions.
 _USES = 2
 
@@ -68,19 +72,23 @@ def collect_picks(
             return
 
 
-def draw_pick_goal(words: dict[str, ObjectWords], rng: np.random.Generator) -> Goal:
+def draw_pick_goal(
+    words: dict[str, ObjectWords], rng: np.random.Generator, among: Sequence[str] | None = None
+) -> Goal:
     """Draw an instruction to pick one of some objects.
 
     Args:
         words: Words of every object in the scene, by name.
         rng: Source of randomness.
+        among: Objects of which at least one must be asked for; any when None.
 
     Returns:
         The goal, every object that the instruction names among its targets.
     """
+    among = list(words) if among is None else among
     if rng.random() >= _ANY_NAME:
-        return draw_goal(words, list(words), rng)
-    asked = words[str(rng.choice(list(words)))]
+        return draw_goal(words, among, rng)
+    asked = words[str(rng.choice(list(among)))]
     names = [name for name in (asked.label, *asked.synonyms) if name is not None]
     text = f"give me the {rng.choice(names)}"
     return Goal(text=text, targets=find_targets(text, words))
@@ -107,10 +115,13 @@ class _Heap:
     def clear_one(self, num_goals: int) -> bool:
         """Try goals; leave the scene with one object less, and say whether that succeeded."""
         num_stored = 0
+        blocked = [name for name in self._expert.blocked(self._seen) if name in self._words]
+        for _ in range(_GOALS_FOR_BLOCKED if blocked else 0):
+            num_stored += self._try(draw_pick_goal(self._words, self._rng, blocked))
         for _ in range(_DRAWS_PER_GOAL * num_goals):
-            num_stored += self._try(draw_pick_goal(self._words, self._rng))
             if num_stored >= num_goals:
                 break
+            num_stored += self._try(draw_pick_goal(self._words, self._rng))
         if self._after is not None:
             self._after.restore()
         return self._after is not None
@@ -120,12 +131,12 @@ class _Heap:
         # What was asked for once in this scene is not asked for again.
         if goal.text in self._texts:
             return False
-        choice = self._expert.choose(self._seen, goal, text)
+        choice = self._expert.choose(self._seen, goal, text, may_clear=True)
         if choice is None:
             return False
-        executed = self._known(choice, goal)
+        executed = self._known(choice)
         if executed is None:
-            executed = self._execute(choice, goal)
+            executed = self._execute(choice)
         if executed is None:
             return False
         self._texts.add(goal.text)
@@ -133,16 +144,17 @@ class _Heap:
         self._expert.store(self._seen, choice, executed, (text, *wordings), self._seed)
         return True
 
-    def _known(self, choice: Choice, goal: Goal) -> int | None:
-        """Return the expert's first choice if it is known to satisfy this goal too."""
+    def _known(self, choice: Choice) -> int | None:
+        """Return the expert's first choice if it is known to do what is wanted here too."""
         index = int(choice.order[0])
         known = self._done.get(index)
-        if known is None or known.name not in goal.targets or known.uses >= _USES:
+        wanted = choice.scene.goal.targets
+        if known is None or known.name not in wanted or known.uses >= _USES:
             return None
         self._done[index] = _Grasped(name=known.name, uses=known.uses + 1)
         return index
 
-    def _execute(self, choice: Choice, goal: Goal) -> int | None:
+    def _execute(self, choice: Choice) -> int | None:
         """Grasp and go back; return the index of what succeeded."""
         order = np.array([i for i in choice.order if int(i) not in self._done], int)
         plan = self._expert.plan(self._seen, order)
@@ -155,4 +167,4 @@ class _Heap:
         if grasped is not None and self._after is None:
             self._after = SceneState(self._expert.scene)
         self._before.restore()
-        return plan.chosen if grasped in goal.targets else None
+        return plan.chosen if grasped in choice.scene.goal.targets else None

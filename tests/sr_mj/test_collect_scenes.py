@@ -1,5 +1,7 @@
 """The expert at work in scenes that are simulated, rendered and perceived."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -7,11 +9,15 @@ import pytest
 from models.arrangements.library import arrangement_names, load_arrangement
 from models.objects.catalogue import object_names
 from policy.demonstrations import DemonstrationFolder
+from sr_mj.assemble import assembled
+from sr_mj.collecting.expert import Expert
 from sr_mj.collecting.folder import open_folder, read_stock, save
 from sr_mj.collecting.tasks import SceneTask
 from sr_mj.collecting.work import Limits, WorkSetting
 from sr_mj.collecting.worker import make_worker
 from sr_mj.execution import Executor
+from sr_mj.instruction import PhaseText
+from sr_mj.oracle import OraclePolicy
 from sr_mj.scene import SceneConfig, find_targets, make_scene
 from sr_mj.scene.state import SceneState
 
@@ -59,7 +65,8 @@ def test_decisions_hold_what_training_needs(folder):
         assert decision.valid[decision.executed]
         valid = decision.expert_logits[decision.valid]
         others = decision.expert_logits[~decision.valid]
-        assert valid.min() > 7 and others.max(initial=-9) < 2
+        assert others.max(initial=-9) < 2
+        assert valid.max() < 2 if decision.clears else valid.min() > 7
         assert (decision.relation is None) == (decision.phase == "pick")
         for number in range(len(decision.wordings)):
             observation = demonstration.observation(number)
@@ -106,6 +113,49 @@ def test_the_same_task_gives_the_same_bytes(worker, results, folder, tmp_path):
     (tmp_path / again.file_name).write_bytes(again.content)
     (shard,) = DemonstrationFolder(tmp_path).shards
     assert shard.digest == folder.shards[1].digest
+
+
+@pytest.fixture
+def blocked(worker):
+    """An expert in a scene where no grasp closes on what is asked for, and its goal."""
+    scene = make_scene(SceneConfig(arrangement="grasp-unseen-00"))
+    pipeline = assembled(scene, lifter=worker._lifter(scene), policy=OraclePolicy(scene))
+    with pipeline as stages:
+        yield Expert(scene, stages, np.random.default_rng(0)), scene.goal
+
+
+def test_what_is_in_the_way_is_taken_away_first(blocked):
+    expert, goal = blocked
+    text = PhaseText(phase="pick", text=goal.text)
+    seen = expert.see_grasps()
+    assert expert.choose(seen, goal, text) is None
+    assert expert.reasons == {"no_valid_candidate": 1}
+    assert set(goal.targets) <= set(expert.blocked(seen))
+
+    choice = expert.choose(seen, goal, text, may_clear=True)
+    assert choice.clears
+    (obstacle,) = choice.scene.goal.targets
+    gripped = OraclePolicy(expert.scene).gripped(seen.candidates)
+    np.testing.assert_array_equal(choice.valid, gripped == obstacle)
+    assert choice.valid[choice.logits.argmax()]
+
+    plan = expert.plan(seen, choice.order)
+    _, outcome = expert.act(choice, plan, keep_target=False)
+    assert outcome.success and outcome.grasped == obstacle
+    expert.store(seen, choice, plan.chosen, (text,), seed=0)
+    assert expert.decisions[0][1].clears
+    assert not expert.choose(expert.see_grasps(), goal, text, may_clear=True).clears
+
+
+def test_nothing_is_taken_away_for_what_cannot_be_seen(blocked):
+    expert, goal = blocked
+    seen = expert.see_grasps()
+    cloud = seen.percept.features
+    away = replace(cloud, points=cloud.points + np.float32(0.5))
+    unseen = replace(seen, percept=replace(seen.percept, features=away))
+    text = PhaseText(phase="pick", text=goal.text)
+    assert expert.choose(unseen, goal, text, may_clear=True) is None
+    assert expert.blocked(unseen) == []
 
 
 @pytest.fixture(scope="module")

@@ -66,6 +66,13 @@ def test_bad_decisions_are_refused(make_decision, changes, message):
     assert str(error.value) == message
 
 
+def test_only_picks_clear(make_decision):
+    assert replace(make_decision(), clears=True).clears
+    with pytest.raises(InvalidArrayError) as error:
+        replace(make_decision("place"), clears=True)
+    assert str(error.value) == "clears: got True for a place, expected it of grasps alone."
+
+
 def test_blank_wordings_and_bad_looks_are_refused(make_wording, make_look):
     with pytest.raises(InvalidArrayError, match=r"^text: got ' ', expected at least one word\.$"):
         make_wording(text=" ")

@@ -12,7 +12,10 @@ def fill_folder(tmp_path, make_look, make_decision):
         folder.mkdir(exist_ok=True)
         for number, size in enumerate(sizes):
             look = make_look()
-            decisions = [(0, make_decision(("pick", "place")[i % 2], 3 + i)) for i in range(size)]
+            decisions = [
+                (0, make_decision(("pick", "place")[i % 2], 3 + i, clears=size == 1))
+                for i in range(size)
+            ]
             write_shard(folder / f"s{number}.h5", {"encoder": encoder}, [look], decisions)
         return folder
 
@@ -24,6 +27,7 @@ def test_shards_are_one_sequence(fill_folder):
     assert len(folder) == 3
     assert folder.scenes == ("s0", "s0", "s1")
     assert folder.phases == ("pick", "place", "pick")
+    assert folder.clears == (False, False, True)
     assert folder.num_candidates == (3, 4, 3)
     assert folder.num_points == (30, 30, 30)
     assert (folder.encoder, folder.feature_dim) == ("tower-1", 16)

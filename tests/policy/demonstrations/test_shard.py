@@ -20,7 +20,7 @@ def shard_path(tmp_path, make_look, make_decision):
     decisions = [
         (0, make_decision()),
         (1, make_decision("place", num_candidates=3, num_points=12)),
-        (0, make_decision()),
+        (0, make_decision(clears=True)),
     ]
     write_shard(path, META, looks, decisions)
     return path, looks, decisions
@@ -45,7 +45,7 @@ def test_what_is_written_is_read_again(shard_path):
         np.testing.assert_array_equal(
             found.look.features, looks[look].features.astype(np.float16).astype(np.float32)
         )
-        for name in ("phase", "relation", "side", "executed", "seed"):
+        for name in ("phase", "relation", "side", "executed", "seed", "clears"):
             assert getattr(found.decision, name) == getattr(decision, name)
         for name in ("valid", "avoid_collision", "expert_logits"):
             np.testing.assert_array_equal(getattr(found.decision, name), getattr(decision, name))

@@ -103,12 +103,15 @@ def _decision(
         avoid_collision=rng.integers(2, size=len(owner)).astype(np.float32),
         expert_logits=np.where(valid, 1.0, 0.0),
         seed=0,
+        clears=phase == "pick" and target == OBJECTS - 1,
     )
 
 
 @pytest.fixture(scope="session")
 def write_scenes() -> SceneWriter:
     """Writes scenes of three objects, each of them asked for once for a pick and once for a place.
+
+    The last pick of a scene counts as one that clears.
 
     The similarity of the points says nothing, unless `similar`: then it points at the target.
     """

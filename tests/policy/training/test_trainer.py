@@ -71,6 +71,9 @@ def test_learns_what_words_mean(write_scenes, make_train_config, plain, tmp_path
     card = json.loads((config.out / "best.json").read_text())
     metrics = card["training"]["metrics"]
     assert metrics["val_loss"] == min(row["val_loss"] for row in rows)
+    # Of three picks of a scene one counts as clearing; there are as many places as picks.
+    kinds = [metrics[f"val_top1_{kind}"] for kind in ("pick", "clear", "place")]
+    assert metrics["val_top1"] == pytest.approx(np.average(kinds, weights=[2, 1, 3]), abs=1e-6)
     reference = card["training"]["reference"]
     assert metrics["val_top1"] > reference["grounding"]["val_top1"] + 0.2
     assert card["encoder"] == "synthetic-1"
