@@ -13,7 +13,7 @@ from policy.similar_region import SmoothedSimilarity
 
 _POSITIVE = (
     "smoothing_radius_m", "pick_sigma_m", "place_sigma_m", "inside_sigma_m", "ring_m",
-    "ring_sigma_m", "min_support",
+    "ring_sigma_m", "min_support", "blocked_m", "clearing_scale_m",
 )  # fmt: skip
 
 
@@ -44,6 +44,11 @@ class GroundingConfig:
             candidate's local evidence counts half. Keeps one stray point from deciding.
         region_weight: Share of nearness to the region in the score; the rest is the local mean
             similarity. The first finds the object, the second centres the grasp on it.
+        blocked_m: If no grasp is this near to the region, it is taken to be blocked: more than the
+            half-width of a finger pad and the errors of cloud and region together. Of 489 choices
+            of demonstrations, 89 of which clear the way, 0.01 to 0.025 did best.
+        clearing_scale_m: Distance over which the bonus of grasps near a blocked region falls to
+            0.37: the size of an object.
         temperature: Difference in score (0 background, 1 target) worth one unit of logit.
         prior_exponent: Weight of log prior. At these values a prior three times better is worth
             0.05 of score: it decides between grasps of one object, never between objects.
@@ -62,6 +67,8 @@ class GroundingConfig:
     ring_sigma_m: float = 0.025
     min_support: float = 2.0
     region_weight: float = 0.5
+    blocked_m: float = 0.025
+    clearing_scale_m: float = 0.05
     temperature: float = 0.1
     prior_exponent: float = 0.5
 
@@ -91,7 +98,9 @@ class GroundingPolicy:
 
     The similarity is averaged over neighbours, expressed as contrast against the rest of the
     cloud (0 for the median point, 1 for the most similar region), and gathered around every
-    candidate; nearness to the most similar region and the geometric prior complete the score.
+    candidate; nearness to the most similar region and the geometric prior complete the score. If
+    nothing can be gripped at that region, the grasps nearest to it win: what they take away is
+    probably in the way.
 
     For a place action the similarity is that to the reference: places over the middle of the most
     similar region win where the relation asks for one inside, places at a distance from its edge
@@ -155,9 +164,15 @@ class GroundingPolicy:
         squared = (offsets**2).sum(axis=-1)
         kernel = np.exp(-squared / (2 * sigma_m**2)) * observation.confidence
         local = (kernel @ relevance) / (kernel.sum(axis=1) + config.min_support)
-        nearness = np.exp(-squared[:, region].min(axis=1) / (2 * sigma_m**2))
+        squared_to_region = squared[:, region].min(axis=1)
+        nearness = np.exp(-squared_to_region / (2 * sigma_m**2))
         weight = config.region_weight
-        return weight * nearness + (1 - weight) * local
+        score = weight * nearness + (1 - weight) * local
+        distance_m = np.sqrt(squared_to_region)
+        if candidates.kind == "pick" and distance_m.min() > config.blocked_m:
+            # Nothing can be gripped there; what is nearest is probably in the way.
+            score = score + np.exp(-distance_m / config.clearing_scale_m)
+        return score
 
     def _place_score(
         self,

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,28 @@ def test_grasp_in_the_air_loses(make_observation, rng: np.random.Generator) -> N
     observation = _cloud(rng, make_observation, target=0)
     candidates = _grasps(np.array([CENTERS[0] + np.array([0, 0, 0.15]), CENTERS[0]]))
     assert GroundingPolicy().score(observation, candidates, rng).best == 1
+
+
+@pytest.mark.parametrize("target", range(3))
+def test_what_is_nearest_to_a_blocked_target_is_grasped(
+    make_observation, rng: np.random.Generator, target: int
+) -> None:
+    """Though other objects are a little similar, and the grasps on them are better."""
+    observation = _cloud(rng, make_observation, target=target)
+    others = [index for index in range(3) if index != target]
+    towards = CENTERS[target] - CENTERS[others[0]]
+    beside = CENTERS[target] + 0.09 * towards / np.linalg.norm(towards)
+    similarity = observation.similarity.copy()
+    on_others = np.linalg.norm(observation.points - CENTERS[target], axis=1) > 0.05
+    similarity[on_others] = 0.2 + 0.1 * rng.random(on_others.sum())
+    similarity[~on_others] = 0.4
+    observation = replace(observation, similarity=similarity.astype(np.float32))
+    candidates = _grasps(np.stack([*CENTERS[others], beside]), np.array([1.0, 1.0, 0.3]))
+    policy = GroundingPolicy()
+    assert policy.score(observation, candidates, rng).best == 2
+    # Where the target itself can be grasped, the same grasp gains nothing.
+    candidates = _grasps(np.stack([CENTERS[target], beside]), np.array([0.1, 1.0]))
+    assert policy.score(observation, candidates, rng).best == 0
 
 
 def test_place_ignores_height(make_observation, rng: np.random.Generator) -> None:
@@ -211,6 +234,7 @@ def test_no_candidates(make_observation, rng: np.random.Generator) -> None:
     [
         ({"pick_sigma_m": 0.0}, "pick_sigma_m: got 0, expected a value above 0."),
         ({"temperature": -1.0}, "temperature: got -1, expected a value above 0."),
+        ({"blocked_m": 0.0}, "blocked_m: got 0, expected a value above 0."),
         ({"ring_m": 0.0}, "ring_m: got 0, expected a value above 0."),
         ({"grow_level": 0.0}, "grow_level: got 0, expected a value between 0 and 1."),
         ({"region_level": 1.0}, "region_level: got 1, expected a value between 0 and 1."),
