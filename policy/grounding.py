@@ -45,8 +45,10 @@ class GroundingConfig:
         region_weight: Share of nearness to the region in the score; the rest is the local mean
             similarity. The first finds the object, the second centres the grasp on it.
         blocked_m: If no grasp is this near to the region, it is taken to be blocked: more than the
-            half-width of a finger pad and the errors of cloud and region together. Of 489 choices
-            of demonstrations, 89 of which clear the way, 0.01 to 0.025 did best.
+            half-width of a finger pad and the errors of cloud and region together. Of 501 choices
+            of demonstrations, 101 of which clear the way, 0.01 to 0.025 did best. Of 264 that
+            clear the way, this rule makes 52 % right instead of 30, of 400 others 97.5 instead
+            of 97.8.
         clearing_scale_m: Distance over which the bonus of grasps near a blocked region falls to
             0.37: the size of an object.
         temperature: Difference in score (0 background, 1 target) worth one unit of logit.

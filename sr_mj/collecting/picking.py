@@ -116,7 +116,7 @@ class _Heap:
         """Try goals; leave the scene with one object less, and say whether that succeeded."""
         num_stored = 0
         blocked = [name for name in self._expert.blocked(self._seen) if name in self._words]
-        for _ in range(_GOALS_FOR_BLOCKED if blocked else 0):
+        for _ in range(min(_GOALS_FOR_BLOCKED, num_goals) if blocked else 0):
             num_stored += self._try(draw_pick_goal(self._words, self._rng, blocked))
         for _ in range(_DRAWS_PER_GOAL * num_goals):
             if num_stored >= num_goals:
