@@ -1,6 +1,6 @@
 """Collect demonstrations: an expert that knows the truth picks and places in random scenes.
 
-    python -m sr_mj.collect --out demos --pick 2500 --place 2000 --workers 2
+    python -m sr_mj.collect --out demos --pick 3000 --place 2000 --workers 2
     python -m sr_mj.collect --out demos --verify
 
 Only what was executed and succeeded is stored, one file a scene. It may be stopped at any moment;

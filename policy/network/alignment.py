@@ -8,7 +8,7 @@ from torch import Tensor, nn
 
 from policy.network.attention import MultiHeadAttention, masked_softmax, scaled_scores
 from policy.network.batch import PHASES, DecisionBatch
-from policy.network.bias import CandidateBias, candidate_basis
+from policy.network.bias import CandidateBias
 from policy.network.config import SRConfig
 from policy.network.encoding import fourier_features, mlp, num_fourier_features
 from policy.network.projections import merge_heads, split_heads
@@ -171,7 +171,6 @@ class ActionAlignment(nn.Module):
         query_in = 7 + (num_fourier if self.query_fourier else 0)
         self.query_mlp = mlp(query_in, width, width, width)
         self.phase = nn.Embedding(len(PHASES), width)
-        self.num_bias_scales = config.num_bias_scales
         self.bias = (
             CandidateBias(len(PHASES), config.num_heads, config.num_bias_scales)
             if config.candidate_bias
@@ -187,6 +186,7 @@ class ActionAlignment(nn.Module):
         phase: Int[Tensor, " batch"],
         values: Float[Tensor, "batch points width"],
         mask: Float[Tensor, "batch heads points"],
+        basis: Float[Tensor, "batch basis candidates points"],
     ) -> tuple[Float[Tensor, "batch candidates width"], Float[Tensor, "batch heads candidates"]]:
         """Align candidates with the cloud.
 
@@ -195,6 +195,7 @@ class ActionAlignment(nn.Module):
             phase: Index into `PHASES`.
             values: V_align, what stage 1 made of the points.
             mask: The semantic mask.
+            basis: Where every point lies relative to every candidate, from `candidate_basis`.
 
         Returns:
             A state for each candidate, and what each head sees of log(1 + mask).
@@ -209,10 +210,7 @@ class ActionAlignment(nn.Module):
         queries = self.query_mlp(pose_inputs) + self.phase(phase)[:, None]
         waves = fourier_features(batch.positions, num_bands)
         keys = self.key_mlp(torch.cat([batch.features, waves], dim=-1))
-        bias = None
-        if self.bias is not None:
-            basis = candidate_basis(batch.poses, batch.positions, phase > 0, self.num_bias_scales)
-            bias = self.bias(basis, phase)
+        bias = None if self.bias is None else self.bias(basis, phase)
         weights = self.attention.weights(queries, keys, batch.point_mask, bias)  # eq. (6)
         # A mask of mean 1 over hundreds of points reaches far beyond 1; its logarithm is close to
         # the score that made it.

@@ -95,6 +95,10 @@ class SRConfig(NetworkConfig):
             semantic mask. Departure: otherwise a whole network lies between the mask and the
             score, and only training could tell it that a large value is good. Without stage 1
             there is no mask, and the points' similarity takes its place.
+        mask_nearness: Add to the logit, with learnt weights, how near the semantic mask is to a
+            candidate. Departure: where nothing can be gripped at the mask, what is in the way has
+            to be taken from beside it, and attention on what is at a candidate cannot tell how far
+            off the mask is.
         one_align: Stage 1, language to vision. Without it (BASE), stage 2 works on the visual
             features themselves.
         language_attention: "gate": the language asks, and its attention is a mask on the points.
@@ -125,6 +129,7 @@ class SRConfig(NetworkConfig):
     similarity: bool = True
     candidate_bias: bool = True
     mask_readout: bool = True
+    mask_nearness: bool = True
     one_align: bool = True
     language_attention: LanguageAttention = "gate"
     dssa: bool = True
@@ -167,8 +172,13 @@ def ablation_switches(name: Ablation) -> dict[str, bool]:
         InvalidConfigError: If there is no such variant.
     """
     switches = {
-        # What has no stage 1 has no mask to read out; it works on the same inputs otherwise.
-        "base": {"one_align": False, "dssa": False, "mask_readout": False},
+        # What has no stage 1 has no mask to look at; it works on the same inputs otherwise.
+        "base": {
+            "one_align": False,
+            "dssa": False,
+            "mask_readout": False,
+            "mask_nearness": False,
+        },
         "sr_a": {"one_align": True, "dssa": False},
         "sr": {"one_align": True, "dssa": True},
     }

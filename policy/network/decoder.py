@@ -4,22 +4,15 @@ import math
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from torch import Tensor, nn
-from torch.nn.functional import softplus
 
-from policy.network.batch import PHASES
-from policy.network.config import NetworkConfig, SRConfig
+from policy.network.config import NetworkConfig
 from policy.network.encoding import mlp
 
 # Size of the learnt query at the start: small enough for the prior and the semantic mask to decide
 # before training, and not the noise of random weights.
 _INITIAL_QUERY = 0.3
-# Weight of the prior at the start, in units of logit: between two grasps of one object.
-_INITIAL_PRIOR_WEIGHT = 2.0
-# Weight of the semantic mask at the start, over all heads that look at what is at the candidate.
-# Their readout of a target exceeds the median candidate's by about 1: a target starts e^6 ahead.
-_INITIAL_MASK_WEIGHT = 6.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,55 +32,6 @@ class NetworkOutput:
     rotvec_tool: Tensor
     opening_m: Tensor
     avoid_collision_logit: Tensor
-
-
-class CandidateEvidence(nn.Module):
-    """Adds what is known of a candidate without the network: its prior, and the mask at it."""
-
-    def __init__(self, config: SRConfig) -> None:
-        """Make the weights.
-
-        Args:
-            config: Which evidence to use.
-        """
-        super().__init__()
-        num_phases, num_heads = len(PHASES), config.num_heads
-        self.prior_weight: nn.Parameter | None = None
-        self.mask_weight: nn.Parameter | None = None
-        if config.prior:
-            # Through a softplus, since a better grasp is never a reason against it.
-            raw = math.log(math.expm1(_INITIAL_PRIOR_WEIGHT))
-            self.prior_weight = nn.Parameter(torch.full((num_phases,), raw))
-        if config.mask_readout:
-            weight = torch.zeros(num_phases, num_heads)
-            num_local = num_heads // 2 if config.candidate_bias else 0
-            weight[:, :num_local] = _INITIAL_MASK_WEIGHT / max(num_local, 1)
-            # A place around the reference is no place on it; how far off is left to training.
-            weight[PHASES.index("place outside")] = 0.0
-            self.mask_weight = nn.Parameter(weight)
-
-    def forward(
-        self,
-        phase: Int[Tensor, " batch"],
-        prior: Float[Tensor, "batch candidates"],
-        readout: Float[Tensor, "batch heads candidates"],
-    ) -> Float[Tensor, "batch candidates"]:
-        """Weigh the evidence.
-
-        Args:
-            phase: Index into `PHASES`.
-            prior: The candidates' priors.
-            readout: What each head of stage 2 sees of the semantic mask.
-
-        Returns:
-            What is added to the logits.
-        """
-        logits = torch.zeros_like(prior)
-        if self.prior_weight is not None:
-            logits = logits + softplus(self.prior_weight)[phase][:, None] * prior
-        if self.mask_weight is not None:
-            logits = logits + (self.mask_weight[phase][:, :, None] * readout).sum(dim=1)
-        return logits
 
 
 class ActionDecoder(nn.Module):

@@ -15,12 +15,13 @@ from policy.network.alignment import (
 )
 from policy.network.base import CandidateNetwork
 from policy.network.batch import DecisionBatch
-from policy.network.bias import position_basis
+from policy.network.bias import candidate_basis, position_basis
 from policy.network.config import SRConfig
-from policy.network.decoder import ActionDecoder, CandidateEvidence, NetworkOutput
+from policy.network.decoder import ActionDecoder, NetworkOutput
 from policy.network.dssa import DSSALayer
 from policy.network.encoder import EncoderLayer
 from policy.network.encoding import fourier_features, num_fourier_features
+from policy.network.evidence import CandidateEvidence, Evidence, mask_nearness
 from policy.network.morton import morton_order
 
 
@@ -74,13 +75,18 @@ class SRNetwork(CandidateNetwork):
             batch = batch.take_points(morton_order(batch.positions, batch.point_mask))
         phase = batch.phase if self.config.side else batch.phase.clamp(max=1)
         mask = self.semantic_mask(batch)
-        states, readout = self.action_alignment(batch, phase, self._values(batch, mask), mask)
+        num_scales = self.config.num_bias_scales
+        basis = candidate_basis(batch.poses, batch.positions, phase > 0, num_scales)
+        values = self._values(batch, mask)
+        states, readout = self.action_alignment(batch, phase, values, mask, basis)
         waves = fourier_features(batch.poses[..., :3], self.config.num_fourier_bands)
         states = states + self.position(waves)
         for layer in self.encoder_layers:
             states = layer(states, batch.candidate_mask)
         output = self.decoder(states)
-        logits = output.logits + self.evidence(phase, batch.prior, readout)
+        nearness = mask_nearness(basis[:, :num_scales], mask) if self.config.mask_nearness else None
+        evidence = Evidence(prior=batch.prior, readout=readout, nearness=nearness)
+        logits = output.logits + self.evidence(phase, evidence)
         return replace(output, logits=logits.masked_fill(~batch.candidate_mask, float("-inf")))
 
     def semantic_mask(self, batch: DecisionBatch) -> Float[Tensor, "batch heads points"]:

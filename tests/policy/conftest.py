@@ -56,7 +56,15 @@ TargetMaker = Callable[[list["DecisionSample"]], "ExpertTargetBatch"]
 NetworkMaker = Callable[[NetworkConfig], "CandidateNetwork"]
 
 # Switches of what the paper does not have.
-PAPER_ONLY = ("prior", "phrase", "side", "similarity", "candidate_bias", "mask_readout")
+PAPER_ONLY = (
+    "prior",
+    "phrase",
+    "side",
+    "similarity",
+    "candidate_bias",
+    "mask_readout",
+    "mask_nearness",
+)
 SR_NETWORKS: list[tuple[str, dict[str, Any]]] = [
     ("base", {}),
     ("sr_a", {}),
@@ -66,7 +74,7 @@ SR_NETWORKS: list[tuple[str, dict[str, Any]]] = [
     ("sr", {"self_attention": "full"}),
     ("sr", {"query_fourier": False, "num_encoder_layers": 0}),
     ("sr", {"language_attention": "points"}),
-    ("base", {"mask_readout": True}),
+    ("base", {"mask_readout": True, "mask_nearness": True}),
     ("sr", dict.fromkeys(PAPER_ONLY, False)),
 ]
 BASELINES: list[tuple[str, dict[str, Any]]] = [

@@ -143,7 +143,8 @@ def test_second_stage_equals_the_equation(candidate_bias: bool) -> None:
     batch = _batch()
     with torch.no_grad():
         values, mask = torch.randn(2, POINTS, 32).double(), torch.rand(2, 4, POINTS).double()
-        states, readout = stage(batch, batch.phase, values, mask)
+        basis = candidate_basis(batch.poses, batch.positions, batch.phase > 0, 6)
+        states, readout = stage(batch, batch.phase, values, mask, basis)
         num_points, i = 25, 1
         waves = [fourier_features(x, 6) for x in (batch.poses[i, :, :3], batch.positions[i])]
         queries = stage.query_mlp(torch.cat([batch.poses[i], waves[0]], dim=-1))
@@ -151,7 +152,6 @@ def test_second_stage_equals_the_equation(candidate_bias: bool) -> None:
         keys = stage.key_mlp(torch.cat([batch.features[i], waves[1]], dim=-1))[:num_points]
         q, k = stage.attention.query(queries), stage.attention.key(keys)
         v = stage.attention.value(values[i, :num_points])
-        basis = candidate_basis(batch.poses, batch.positions, batch.phase > 0, 6)
         for c in range(CANDIDATES):
             gathered = torch.zeros(32, dtype=torch.float64)
             for h in range(4):
@@ -178,7 +178,8 @@ def test_half_of_the_heads_start_at_the_candidate() -> None:
     mask[:, :, 0] = 1.0
     batch = replace(batch, positions=positions)
     values = torch.zeros(2, POINTS, 64, dtype=torch.float64)
-    readout = stage(batch, batch.phase, values, mask)[1] / math.log(2)
+    basis = candidate_basis(batch.poses, positions, batch.phase > 0, 6)
+    readout = stage(batch, batch.phase, values, mask, basis)[1] / math.log(2)
     assert (readout[:, :4, 0] > 0.9).all()
     assert (readout[:, 4:, 0] < 0.2).all()
 

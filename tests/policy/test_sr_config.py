@@ -49,7 +49,7 @@ def test_paper_sizes() -> None:
 def test_ablations(name: Any) -> None:
     config = SRConfig(feature_dim=8, **ablation_switches(name))
     assert (config.one_align, config.dssa) == (name != "base", name == "sr")
-    assert config.mask_readout == (name != "base")
+    assert config.mask_readout == config.mask_nearness == (name != "base")
     # The same inputs for all.
     assert config.prior and config.phrase and config.side and config.similarity
 

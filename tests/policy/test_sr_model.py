@@ -143,8 +143,9 @@ def test_untrained_network_prefers_what_is_asked_for(
 def test_weights_are_the_softmax_of_inner_products(
     rng: np.random.Generator, make_observation, make_candidates, make_config, make_network
 ) -> None:
-    # Eq. (13) and (14), with the evidence that we add: prior and mask are switched off.
-    config = make_config(prior=False, mask_readout=False, num_encoder_layers=0)
+    # Eq. (13) and (14), with the evidence that we add switched off: prior and mask.
+    no_evidence = dict.fromkeys(("prior", "mask_readout", "mask_nearness"), False)
+    config = make_config(num_encoder_layers=0, **no_evidence)
     network = make_network(config).double()
     sample = make_sample(make_observation(rng), make_candidates(rng), config)
     batch = collate([sample])
