@@ -34,6 +34,7 @@ install_import_hook(
                 "dssa",
                 "encoder",
                 "encoding",
+                "evidence",
                 "loss",
                 "model",
                 "morton",
