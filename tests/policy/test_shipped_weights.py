@@ -52,8 +52,8 @@ def test_the_card_says_where_they_come_from(name, card):
     assert f"--variant {SHIPPED[name]} " in training["command"]
     assert training["data"]["decisions"]["train"] >= 4000
     assert training["versions"]["torch"] and len(training["data"]["digest"]) == 64
-    # Better than a random choice among its candidates by far.
-    assert training["metrics"]["val_top1"] > 0.8
+    # Better than a random choice among its candidates by far; VLG sees segments, not points.
+    assert training["metrics"]["val_top1"] > (0.8 if name == "vlg" else 0.85)
 
 
 def test_they_were_trained_alike():
