@@ -27,6 +27,20 @@ def bias_scales(num_scales: int) -> list[float]:
     return [math.exp(low + (high - low) * i / steps) for i in range(num_scales)]
 
 
+def nearest_scale(num_scales: int, wanted: float) -> int:
+    """Index of the radial function whose scale is nearest to a wanted one, by ratio.
+
+    Args:
+        num_scales: Number of radial functions.
+        wanted: Scale, normalised units.
+
+    Returns:
+        The index.
+    """
+    off = [abs(math.log(scale / wanted)) for scale in bias_scales(num_scales)]
+    return off.index(min(off))
+
+
 def position_basis(
     positions: Float[Tensor, "batch points 3"], num_scales: int
 ) -> Float[Tensor, "batch basis points points"]:
@@ -141,11 +155,9 @@ class CandidateBias(nn.Module):
         """
         super().__init__()
         weight = torch.zeros(num_phases, num_heads, num_scales + _NUM_TOOL_FUNCTIONS)
-        scales = bias_scales(num_scales)
         for head in range(num_heads // 2):
             wanted = _LOCAL_SCALES[head % len(_LOCAL_SCALES)]
-            nearest = min(range(num_scales), key=lambda i: abs(math.log(scales[i] / wanted)))
-            weight[:, head, nearest] = _LOCAL_STRENGTH
+            weight[:, head, nearest_scale(num_scales, wanted)] = _LOCAL_STRENGTH
         self.weight = nn.Parameter(weight)
 
     def forward(

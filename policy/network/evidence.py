@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from torch.nn.functional import softplus
 
 from policy.network.batch import PHASES
-from policy.network.bias import bias_scales
+from policy.network.bias import nearest_scale
 from policy.network.config import SRConfig
 
 # Weight of the prior at the start, in units of logit: between two grasps of one object.
@@ -66,11 +66,8 @@ class CandidateEvidence(nn.Module):
             self.mask_weight = nn.Parameter(weight)
         if config.mask_nearness:
             weight = torch.zeros(num_phases, config.num_bias_scales)
-            off = [
-                abs(math.log(s / _INITIAL_NEARNESS_SCALE))
-                for s in bias_scales(config.num_bias_scales)
-            ]
-            weight[PHASES.index("pick"), off.index(min(off))] = _INITIAL_NEARNESS_WEIGHT
+            scale = nearest_scale(config.num_bias_scales, _INITIAL_NEARNESS_SCALE)
+            weight[PHASES.index("pick"), scale] = _INITIAL_NEARNESS_WEIGHT
             self.nearness_weight = nn.Parameter(weight)
 
     def forward(
