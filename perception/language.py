@@ -190,6 +190,13 @@ class Instruction:
         return self.target or self.reference or self.text
 
     @property
+    def unwanted(self) -> tuple[str, ...]:
+        """What is spoken of besides the target phrase, and is something else: the reference."""
+        if self.target is None or self.reference in (None, self.target):
+            return ()
+        return (self.reference,)
+
+    @property
     def region(self) -> Literal["inside", "outside"] | None:
         """Where to place: in or on the reference, or around it; None without a place goal."""
         if self.relation is None:

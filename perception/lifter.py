@@ -128,12 +128,16 @@ class MultiViewLifter:
         geometry, cloud = self._scene_clouds(ordered_views(views))
         return LiftedScene(cloud=cloud, scorer=self._scorer, geometry=geometry)
 
-    def perceive(self, views: Sequence[CameraView], instruction: str) -> Percept:
+    def perceive(
+        self, views: Sequence[CameraView], instruction: str, *, unwanted: Sequence[str] = ()
+    ) -> Percept:
         """Perceive a scene with respect to one instruction.
 
         Args:
             views: At least one view, under different names; their order does not matter.
             instruction: What the robot is asked to do.
+            unwanted: What is not looked for, besides what the instruction itself tells by naming
+                both a target and a reference; see `TextScorer.score`.
 
         Returns:
             The clouds and the text features.
@@ -143,12 +147,15 @@ class MultiViewLifter:
             InvalidTextError: If the instruction holds no words, or too many.
             EmptyCloudError: If no point is left inside the workspace.
         """
-        target_phrase = parse_instruction(instruction).target_phrase
+        parsed = parse_instruction(instruction)
+        target_phrase = parsed.target_phrase
         # Texts before images: what is wrong with them shows at once.
         target_text = self._scorer.encode(target_phrase)
         text = self._scorer.encode(instruction)
         geometry, cloud = self._scene_clouds(ordered_views(views))
-        similarity = self._scorer.score(cloud.features, target_phrase)
+        similarity = self._scorer.score(
+            cloud.features, target_phrase, (*parsed.unwanted, *unwanted)
+        )
         return Percept(
             geometry=geometry,
             features=replace(cloud, similarity=similarity),

@@ -141,13 +141,16 @@ class LiftedScene:
         """
         instruction = parse_instruction(text)
         check_length(text)  # the whole text must be usable, not only its parts
-        answer = self._find(instruction, instruction.target_phrase)
+        answer = self._find(instruction, instruction.target_phrase, instruction.unwanted)
         if instruction.target is not None and instruction.reference is not None:
             answer = replace(answer, reference=self._find(instruction, instruction.reference))
         return answer
 
-    def _find(self, instruction: Instruction, phrase: str) -> Answer:
-        cloud = replace(self.cloud, similarity=self.similarity(phrase))
+    def _find(
+        self, instruction: Instruction, phrase: str, unwanted: tuple[str, ...] = ()
+    ) -> Answer:
+        similarity = self.scorer.score(self.cloud.features, phrase, unwanted)
+        cloud = replace(self.cloud, similarity=similarity)
         best = int(np.argmax(cloud.similarity))
         region = grow_region(cloud.points, cloud.similarity, best)
         return Answer(instruction=instruction, phrase=phrase, cloud=cloud, best=best, region=region)

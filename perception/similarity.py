@@ -12,6 +12,7 @@ def relevancy(
     features: Float32[np.ndarray, "n c"],
     text: TextFeatures,
     negatives: Sequence[TextFeatures],
+    unwanted: Sequence[TextFeatures] = (),
     *,
     sharpness: float,
 ) -> Float32[np.ndarray, " n"]:
@@ -25,10 +26,16 @@ def relevancy(
 
     so that 0.5 means "as well as the best negative". Without negatives the result is the cosine.
 
+    A sentence may name what it does not ask for: "get something to drink, put it near the soap". A
+    point is then asked again, with the texts `unwanted` instead of the negatives, and the answers
+    are multiplied. As one more negative, such a text would count only where it beats "object"; as a
+    factor it weighs wherever the two texts compete.
+
     Args:
         features: (N, C) float32, unit rows.
         text: The text that is looked for.
         negatives: Features of the negative prompts.
+        unwanted: Features of texts that are spoken of and not looked for.
         sharpness: s, how steeply the answer turns from 0 to 1.
 
     Returns:
@@ -37,5 +44,18 @@ def relevancy(
     cosine = features @ text.pooled
     if not negatives:
         return cosine
-    strongest = (features @ np.stack([n.pooled for n in negatives], axis=1)).max(axis=1)
+    answer = _answer(features, cosine, negatives, sharpness)
+    if unwanted:
+        answer *= _answer(features, cosine, unwanted, sharpness)
+    return answer
+
+
+def _answer(
+    features: Float32[np.ndarray, "n c"],
+    cosine: Float32[np.ndarray, " n"],
+    rivals: Sequence[TextFeatures],
+    sharpness: float,
+) -> Float32[np.ndarray, " n"]:
+    """Tell how much better than the strongest rival a text fits, 0..1."""
+    strongest = (features @ np.stack([r.pooled for r in rivals], axis=1)).max(axis=1)
     return (1.0 / (1.0 + np.exp(-sharpness * (cosine - strongest)))).astype(np.float32)

@@ -74,22 +74,25 @@ class TextScorer:
             self._texts.put(key, features)
         return features
 
-    def score(self, features: np.ndarray, text: str) -> np.ndarray:
+    def score(self, features: np.ndarray, text: str, unwanted: Sequence[str] = ()) -> np.ndarray:
         """Compare features with a text.
 
         Args:
             features: (N, C) float32, unit rows.
             text: What is looked for.
+            unwanted: What is spoken of, but not looked for. Makes no difference without
+                `negative_prompts`.
 
         Returns:
             (N,) float32; see `perception.similarity.relevancy`.
 
         Raises:
-            InvalidTextError: If the text is empty or too long.
+            InvalidTextError: If a text is empty or too long.
         """
-        negatives = [self.encode_ensemble(prompt) for prompt in self.negative_prompts]
         wanted = self.encode_ensemble(text)
-        return relevancy(features, wanted, negatives, sharpness=self.sharpness)
+        negatives = [self.encode_ensemble(prompt) for prompt in self.negative_prompts]
+        others = [self.encode_ensemble(other) for other in unwanted]
+        return relevancy(features, wanted, negatives, others, sharpness=self.sharpness)
 
     def encode_ensemble(self, text: str) -> TextFeatures:
         """Encode a text under all wordings.

@@ -17,12 +17,14 @@ class PhaseText:
         relation: One of `perception.relations.RELATIONS`; None for picking, or where the
             instruction was not understood.
         side: Whether the relation asks for a place in or on the reference, or around it.
+        unwanted: What the instruction names for the other phase: not what to look for in this one.
     """
 
     phase: ActionKind
     text: str
     relation: str | None = None
     side: PlaceSide | None = None
+    unwanted: tuple[str, ...] = ()
 
 
 def names_target(text: str) -> bool:
@@ -38,12 +40,15 @@ def pick_text(text: str) -> PhaseText:
 
     Returns:
         The instruction itself, unless it also says where to place: then only what comes before,
-        in a template's wording, since the place part names another object.
+        in a template's wording, since the place part names another object. That one is unwanted:
+        who picks it has nothing left to place by.
     """
     instruction = parse_instruction(text)
     if instruction.relation is None or instruction.target is None:
         return PhaseText(phase="pick", text=text)
-    return PhaseText(phase="pick", text=f"give me the {instruction.target}")
+    return PhaseText(
+        phase="pick", text=f"give me the {instruction.target}", unwanted=instruction.unwanted
+    )
 
 
 def place_text(text: str) -> PhaseText:

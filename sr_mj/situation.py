@@ -69,7 +69,7 @@ def assess(
         views = look(scene, pipeline, rngs.noise)
     try:
         with watch.measure("perceive"):
-            percept = pipeline.lifter.perceive(views, text.text)
+            percept = pipeline.lifter.perceive(views, text.text, unwanted=text.unwanted)
     except EmptyCloudError:
         return Situation(text=text, views=views, seconds=watch.seconds)
     with watch.measure("propose"):

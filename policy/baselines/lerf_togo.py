@@ -33,6 +33,8 @@ class LerfTogoPolicy(OnePhasePolicy):
     - The relevancy against the negative prompts is that of the observation's similarity. Pooled, it
       is the margin over the strongest negative of each point, which is exact where neighbours have
       the same strongest negative. If the similarity is a plain cosine, there are no negatives.
+      Where the instruction names something else as well, the similarity is a product of two such
+      answers (docs/perception.md), and the margin that of their product.
     - There are no DINO features: the mask grows over neighbouring points whose pooled features have
       a cosine of 0.8 or more with that of the most relevant point.
     - Instructions here name no parts: the part is the object. A grasp's semantic score is the mean

@@ -108,6 +108,19 @@ def test_composite_paraphrases(text: str, parts: tuple[str | None, str, str]) ->
     assert (instruction.target, instruction.relation, instruction.reference) == parts
 
 
+@pytest.mark.parametrize(
+    ("text", "unwanted"),
+    [
+        ("get something to drink, put it near the apple", ("apple",)),
+        ("put the cup next to the cup", ()),
+        ("put it near the bowl", ()),
+        ("give me the bowl", ()),
+    ],
+)
+def test_the_reference_is_not_what_to_look_for(text: str, unwanted: tuple[str, ...]) -> None:
+    assert parse_instruction(text).unwanted == unwanted
+
+
 @pytest.mark.parametrize("relation", RELATIONS)
 def test_region(relation: str) -> None:
     region = parse_instruction(f"put it {relation} the bowl").region

@@ -231,3 +231,27 @@ def test_relevancy_values() -> None:
     wanted = 1 / (1 + np.exp(-10 * (np.array([1.0, 0.0, 0.0]) - best_negative)))
     np.testing.assert_allclose(relevancy(features, text, negatives, sharpness=10.0), wanted, 1e-5)
     np.testing.assert_array_equal(relevancy(features, text, [], sharpness=10.0), [1, 0, 0])
+    unwanted = _text(1, 0, 1)  # as near to the text as to the third feature
+    factor = 1 / (1 + np.exp(-10 * (np.array([1.0, 0.0, 0.0]) - np.sqrt([0.5, 0.0, 0.5]))))
+    found = relevancy(features, text, negatives, [unwanted], sharpness=10.0)
+    np.testing.assert_allclose(found, wanted * factor, 1e-5)
+    np.testing.assert_array_equal(
+        relevancy(features, text, [], [unwanted], sharpness=10.0), [1, 0, 0]
+    )
+
+
+def test_what_is_named_but_not_asked_for_is_not_found(
+    lifter: MultiViewLifter, table_views: tuple[CameraView, ...]
+) -> None:
+    # Half red and half blue: the ball and the cylinder are as near.
+    for other, center in (("red", (0.6, -0.05)), ("blue", (0.5, 0.08))):
+        sentence = f"give me the red blue object, put it near the {other} object"
+        by_sentence = lifter.perceive(table_views, sentence).features
+        by_part = lifter.perceive(
+            table_views, "give me the red blue object", unwanted=(f"{other} object",)
+        ).features
+        assert by_sentence.similarity.tobytes() == by_part.similarity.tobytes()
+        answer = lifter.lift(table_views).query(sentence)
+        assert answer.cloud.similarity.tobytes() == by_part.similarity.tobytes()
+        best = by_part.points[np.argsort(by_part.similarity)[-50:]]
+        assert np.linalg.norm(best[:, :2] - center, axis=1).max() < 0.06

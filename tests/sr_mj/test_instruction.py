@@ -27,7 +27,9 @@ def test_an_instruction_to_place_names_no_target(template, relation, side):
 def test_a_combined_instruction_is_divided():
     text = "I want a strawberry, put it near the apple"
     assert names_target(text)
-    assert pick_text(text) == PhaseText(phase="pick", text="give me the strawberry")
+    assert pick_text(text) == PhaseText(
+        phase="pick", text="give me the strawberry", unwanted=("apple",)
+    )
     assert place_text(text) == PhaseText(
         phase="place", text="put it near the apple", relation="near", side="outside"
     )
