@@ -42,3 +42,6 @@ class Workspace:
 
 GRASP_WORKSPACE = Workspace(lower=(0.276, -0.224, 0.0), upper=(0.724, 0.224, 0.4))
 PICK_PLACE_WORKSPACE = Workspace(lower=(0.164, -0.336, 0.0), upper=(0.836, 0.336, 0.4))
+# Its halves: where things are taken from, and where they are put.
+PICK_ZONE = Workspace(lower=(0.164, -0.336, 0.0), upper=(0.836, 0.0, 0.4))
+PLACE_ZONE = Workspace(lower=(0.164, 0.0, 0.0), upper=(0.836, 0.336, 0.4))

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from models.workspace import Workspace
 from perception.cloud import GeometryCloud
 from policy.actions import ActionCandidates
 from sr_mj.attempt import Attempt, Stopwatch
@@ -187,7 +188,8 @@ def _assess_grasps(
     scene: Scene, pipeline: Pipeline, rngs: EpisodeRngs, failed: FailedGrasps
 ) -> Situation:
     def propose(cloud: GeometryCloud, _: HeldObject | None) -> ActionCandidates:
-        return failed.without(pipeline.generator.pick(cloud, rngs.candidates))
+        found = pipeline.generator.pick(cloud, rngs.candidates)
+        return failed.without(_inside(scene.zone("pick"), found))
 
     return assess(scene, pipeline, rngs, pick_text(scene.goal.text), propose)
 
@@ -197,9 +199,14 @@ def _assess_places(
 ) -> Situation:
     def propose(cloud: GeometryCloud, held: HeldObject | None) -> ActionCandidates:
         assert held is not None
-        return pipeline.placer.place(cloud, held, rngs.candidates)
+        found = pipeline.placer.place(cloud, held, rngs.candidates)
+        return _inside(scene.zone("place"), found)
 
     return assess(scene, pipeline, rngs, place_text(scene.goal.text), propose, describe_held)
+
+
+def _inside(zone: Workspace, candidates: ActionCandidates) -> ActionCandidates:
+    return candidates.take(np.flatnonzero(zone.contains_xy(candidates.positions)))
 
 
 def _attempt(

@@ -1,7 +1,7 @@
 """What the robot faces before it decides: what it sees, and what it could do about it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,7 +27,8 @@ class Situation:
     Attributes:
         text: What the instruction says about this phase.
         views: What the cameras saw.
-        percept: What was made of it; None if no object was in sight.
+        percept: What was made of it, its features being those of the phase's zone; None if no
+            object was in sight there.
         proposed: All actions that were proposed; None if there was no percept.
         candidates: Those among them that the policy may choose.
         held: What is in the gripper, as far as it was seen; for placing only.
@@ -64,7 +65,7 @@ def assess(
     Returns:
         What there is to decide.
     """
-    watch = Stopwatch()
+    watch, zone = Stopwatch(), scene.zone(text.phase)
     with watch.measure("look"):
         views = look(scene, pipeline, rngs.noise)
     try:
@@ -72,6 +73,11 @@ def assess(
             percept = pipeline.lifter.perceive(views, text.text, unwanted=text.unwanted)
     except EmptyCloudError:
         return Situation(text=text, views=views, seconds=watch.seconds)
+    # Obstacles are everywhere, what the sentence is about in this phase's zone only.
+    is_inside = zone.contains_xy(percept.features.points)
+    if not is_inside.any():
+        return Situation(text=text, views=views, seconds=watch.seconds)
+    percept = replace(percept, features=percept.features.take(is_inside))
     with watch.measure("propose"):
         held = None if describe_held is None else describe_held(percept.geometry)
         proposed = propose(percept.geometry, held)

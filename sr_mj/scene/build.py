@@ -11,7 +11,9 @@ from models.arrangements.paraphrases import wordings
 from models.gripper_geometry import ROBOTIQ_2F85_CLASS
 from models.objects.words import ObjectWords
 from models.workspace import Workspace
+from policy.actions import ActionKind
 from sr_mj.errors import SceneError
+from sr_mj.instruction import names_target
 from sr_mj.scene.arranged import arrange, arranged_goal
 from sr_mj.scene.compose import OBJECT_BODY, compose_scene
 from sr_mj.scene.config import SceneConfig
@@ -83,6 +85,21 @@ class Scene:
     def workspace(self) -> Workspace:
         """Box that the objects started in."""
         return self.config.kind.workspace
+
+    def zone(self, phase: ActionKind) -> Workspace:
+        """Return the box in which a phase of the goal takes place.
+
+        Args:
+            phase: Pick or place.
+
+        Returns:
+            The kind's zone for it, where there are zones and the goal is to pick something and to
+            place it; otherwise the whole workspace.
+        """
+        kind = self.config.kind
+        zone = kind.pick_zone if phase == "pick" else kind.place_zone
+        is_for_both = self.goal.place is not None and names_target(self.goal.text)
+        return zone if zone is not None and is_for_both else self.workspace
 
     def T_world_object(self, name: str) -> np.ndarray:
         """Return the (4, 4) pose of an object's frame in the world. Ground truth."""

@@ -7,7 +7,13 @@ from typing import Any, Literal
 from models.arrangements.arrangement import Arrangement
 from models.arrangements.library import arrangement_names, load_arrangement, summary
 from models.cameras import camera_preset
-from models.workspace import GRASP_WORKSPACE, PICK_PLACE_WORKSPACE, Workspace
+from models.workspace import (
+    GRASP_WORKSPACE,
+    PICK_PLACE_WORKSPACE,
+    PICK_ZONE,
+    PLACE_ZONE,
+    Workspace,
+)
 from sr_mj.errors import ConfigError, UnknownNameError, unknown_name_message
 
 Split = Literal["seen", "unseen"]
@@ -22,6 +28,8 @@ class SceneKind:
         num_heaped: Objects dropped one after another into one region, so that they stack.
         num_spread: Objects set down apart from each other.
         workspace: Box that the objects must stay in and that perception looks at.
+        pick_zone: Part of it from which a goal to pick and place takes things; None for all of it.
+        place_zone: Part of it into which such a goal puts them.
         heap_center: x, y about which heaped objects drop, metres.
         heap_half_m: Half width of the square in which they drop.
         spread_lower: Smallest x, y of the centres of spread objects.
@@ -34,6 +42,8 @@ class SceneKind:
     num_heaped: int = 0
     num_spread: int = 0
     workspace: Workspace = GRASP_WORKSPACE
+    pick_zone: Workspace | None = None
+    place_zone: Workspace | None = None
     heap_center: tuple[float, float] = (0.5, 0.0)
     heap_half_m: float = 0.13
     spread_lower: tuple[float, float] = (0.33, -0.17)
@@ -53,6 +63,8 @@ SCENE_KINDS: dict[str, SceneKind] = {
         num_heaped=5,
         num_spread=3,
         workspace=PICK_PLACE_WORKSPACE,
+        pick_zone=PICK_ZONE,
+        place_zone=PLACE_ZONE,
         heap_center=(0.5, -0.17),
         heap_half_m=0.09,
         spread_lower=(0.33, 0.10),

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from models.workspace import Workspace
 from perception.relations import INSIDE_RELATIONS
 from sr_mj.errors import SceneError
 from sr_mj.scene import Goal, Scene, SceneConfig, find_goal, make_scene
@@ -52,13 +53,15 @@ def _draw_goal(scene: Scene, relation: str, rng: np.random.Generator) -> Goal | 
     kind = scene.config.kind
     # Where there is a heap, things are picked from it and placed by what stands apart.
     apart = [item.name for item in scene.objects[: kind.num_spread]]
+    if kind.pick_zone is not None and kind.place_zone is not None:
+        apart = [name for name in apart if _is_in(kind.place_zone, scene, name)]
     pool = [
         n for n in reference_pool(relation, [o.asset.name for o in scene.objects]) if n in apart
     ]
     movable = [
         item.name
         for item in scene.objects
-        if item.graspable and (not kind.num_heaped or item.name not in apart)
+        if item.graspable and (kind.pick_zone is None or _is_in(kind.pick_zone, scene, item.name))
     ]
     for reference in rng.permutation(pool):
         for moved in rng.permutation(movable):
@@ -80,6 +83,10 @@ def _draw_goal(scene: Scene, relation: str, rng: np.random.Generator) -> Goal | 
             if all(_can_place(scene, name, goal, rng) for name in targets):
                 return goal
     return None
+
+
+def _is_in(zone: Workspace, scene: Scene, name: str) -> bool:
+    return bool(zone.contains_xy(scene.T_world_object(name)[:3, 3]))
 
 
 def _template(is_combined: bool, rng: np.random.Generator) -> str:
