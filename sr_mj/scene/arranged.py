@@ -8,7 +8,7 @@ import numpy as np
 
 from models.arrangements.arrangement import ArrangedObject, Arrangement, Pose
 from models.objects.catalogue import open_catalogue
-from models.objects.fingerprint import fingerprint
+from models.objects.fingerprint import fingerprint, matches
 from sr_mj.errors import SceneError
 from sr_mj.scene.compose import ComposedScene, compose_scene, home_state
 from sr_mj.scene.config import SceneConfig
@@ -204,7 +204,7 @@ def _changed_objects(arrangement: Arrangement, layout: Layout) -> frozenset[str]
     return frozenset(
         item.name
         for item, asset in zip(arrangement.objects, layout.assets, strict=True)
-        if item.fingerprint != fingerprint(asset)
+        if item.fingerprint is None or not matches(asset, item.fingerprint)
     )
 
 
