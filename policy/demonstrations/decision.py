@@ -102,6 +102,8 @@ class Decision:
         seed: Seed of the scene that it was made in.
         clears: Whether no candidate closes on a target, and a grasp was executed that takes away
             what is in the way.
+        objects: Names, in the catalogue, of the objects that the instruction means: what may be
+            picked, or what it may be placed by. For splits by object, no input of a policy.
 
     Raises:
         InvalidArrayError: If a field has a wrong shape or value, or the fields don't fit.
@@ -118,6 +120,7 @@ class Decision:
     expert_logits: np.ndarray
     seed: int
     clears: bool = False
+    objects: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the fields and replace the arrays by read-only copies."""

@@ -19,7 +19,7 @@ import numpy as np
 from policy.actions import ActionCandidates
 from policy.demonstrations.decision import Decision, Look, Wording
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 _HALF = np.float16
 _ARRAYS = ("avoid_collision", "expert_logits")
@@ -49,6 +49,7 @@ def fill(
             "relation": decision.relation,
             "side": decision.side,
             "clears": decision.clears,
+            "objects": list(decision.objects),
             "executed": decision.executed,
             "seed": decision.seed,
             "num_candidates": len(decision.candidates),
@@ -114,6 +115,7 @@ def read_decision(group: Any, entry: dict[str, Any]) -> Decision:
         relation=entry["relation"],
         side=entry["side"],
         clears=entry["clears"],
+        objects=tuple(entry["objects"]),
         wordings=tuple(
             _read_wording(group[f"wordings/{number}"], text)
             for number, text in enumerate(entry["texts"])

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from perception.views import CameraView
 from policy.actions import ActionCandidates
 from policy.demonstrations import Decision, Look, Wording
 from sr_mj.candidates.held import HeldObject, held_object
+from sr_mj.collecting.choices import Choice, Seen, meant_objects
 from sr_mj.collecting.detours import needs_detour
 from sr_mj.errors import SceneError
 from sr_mj.execution import Executor
@@ -31,50 +32,6 @@ _ON_TARGET_M = 0.006
 _LEAST_IN_SIGHT = 5
 """So many points of the cloud have to lie so near to a target for it to be in sight: of what is
 hidden altogether, nothing tells what hides it."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Seen:
-    """One look, and what could be done after it.
-
-    Attributes:
-        views: What the cameras saw.
-        percept: What was made of it, with respect to no instruction in particular.
-        candidates: Actions that the arm can reach, for whatever goal.
-        avoid_collision: (K,) float32, 1 where a detour is needed.
-        held: What is in the gripper, for placing only.
-    """
-
-    views: tuple[CameraView, ...]
-    percept: Percept
-    candidates: ActionCandidates
-    avoid_collision: np.ndarray
-    held: HeldObject | None = None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Choice:
-    """What the expert makes of a goal, before anything is executed.
-
-    Attributes:
-        scene: The scene with that goal; if what is in the way has to be taken away first, with that
-            as its target.
-        logits: (K,) float32 the expert's scores.
-        valid: (K,) whether a candidate does what is asked for, or, if none does and this clears,
-            closes on what is in the way.
-        clears: Whether no candidate does what is asked for.
-    """
-
-    scene: Scene
-    logits: np.ndarray
-    valid: np.ndarray
-    clears: bool = False
-
-    @property
-    def order(self) -> np.ndarray:
-        """Indices of the valid candidates, best first."""
-        order = np.argsort(-self.logits, kind="stable")
-        return order[self.valid[order]]
 
 
 class Expert:
@@ -155,9 +112,9 @@ class Expert:
         scene = replace(self.scene, goal=goal)
         observation, oracle = observe(seen.percept, scene, text), OraclePolicy(scene)
         logits = oracle.score(observation, seen.candidates, self._policy).logits
-        valid = logits > _VALID_LOGIT
+        valid, objects = logits > _VALID_LOGIT, meant_objects(scene, goal, text)
         if valid.any():
-            return Choice(scene=scene, logits=logits, valid=valid)
+            return Choice(scene=scene, logits=logits, valid=valid, objects=objects)
         could_be = [n for n in goal.targets if find_object(scene, n).graspable]
         if may_clear and could_be and _is_in_sight(could_be, oracle, seen):
             gripped = oracle.gripped(seen.candidates)
@@ -165,7 +122,7 @@ class Expert:
             if obstacle:
                 scene = replace(scene, goal=replace(goal, targets=(obstacle,)))
                 valid = gripped == obstacle
-                return Choice(scene=scene, logits=logits, valid=valid, clears=True)
+                return Choice(scene=scene, logits=logits, valid=valid, objects=objects, clears=True)
         self.reasons["no_valid_candidate"] += 1
         return None
 
@@ -235,6 +192,7 @@ class Expert:
             expert_logits=choice.logits,
             seed=seed,
             clears=choice.clears,
+            objects=choice.objects,
         )
         self.decisions.append((look, decision))
 

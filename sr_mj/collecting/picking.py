@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.objects.words import ObjectWords
-from sr_mj.collecting.expert import Choice, Expert, Seen
+from sr_mj.collecting.choices import Choice, Seen
+from sr_mj.collecting.expert import Expert
 from sr_mj.collecting.wordings import reword_pick
 from sr_mj.instruction import PhaseText
 from sr_mj.scene import Goal, Scene, find_targets

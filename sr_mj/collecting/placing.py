@@ -7,8 +7,9 @@ import shapely
 
 from models.objects.words import ObjectWords
 from perception.relations import INSIDE_RELATIONS, OUTSIDE_RELATIONS
+from sr_mj.collecting.choices import Seen
 from sr_mj.collecting.crowds import OPEN_CATEGORIES
-from sr_mj.collecting.expert import Expert, Seen
+from sr_mj.collecting.expert import Expert
 from sr_mj.collecting.picking import NUM_PARAPHRASES, words_on_table
 from sr_mj.collecting.wordings import reword_pick, reword_place
 from sr_mj.instruction import PhaseText, place_text

@@ -18,7 +18,7 @@ from sr_mj.collecting.worker import make_worker
 from sr_mj.execution import Executor
 from sr_mj.instruction import PhaseText
 from sr_mj.oracle import OraclePolicy
-from sr_mj.scene import SceneConfig, find_targets, make_scene
+from sr_mj.scene import SceneConfig, find_goal, find_targets, make_scene
 from sr_mj.scene.state import SceneState
 
 pytestmark = [pytest.mark.render, pytest.mark.slow]
@@ -105,6 +105,16 @@ def test_a_pick_names_what_it_closes_on(folder):
             if entry["phase"] == "pick":
                 targets = [find_targets(text, words) for text in entry["texts"]]
                 assert targets[0] and all(set(t) == set(targets[0]) for t in targets)
+                meant = {
+                    item["object"] for item in shard.meta["objects"] if item["name"] in targets[0]
+                }
+                assert entry["objects"] == sorted(meant)
+            else:
+                # Said by its title, another name or a general word, "the bowl" is what it means.
+                reference = find_goal(entry["texts"][0], words).place.references
+                assert entry["objects"] == sorted(
+                    {item["object"] for item in shard.meta["objects"] if item["name"] in reference}
+                )
 
 
 def test_the_same_task_gives_the_same_bytes(worker, results, folder, tmp_path):
@@ -144,6 +154,8 @@ def test_what_is_in_the_way_is_taken_away_first(blocked):
     assert outcome.success and outcome.grasped == obstacle
     expert.store(seen, choice, plan.chosen, (text,), seed=0)
     assert expert.decisions[0][1].clears
+    # What is asked for, not what is in the way.
+    assert expert.decisions[0][1].objects == goal.targets
     assert not expert.choose(expert.see_grasps(), goal, text, may_clear=True).clears
 
 

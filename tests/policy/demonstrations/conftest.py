@@ -61,6 +61,7 @@ def make_decision(rng, make_wording, make_candidates) -> Callable[..., Decision]
             "valid": np.arange(num_candidates) % 2 == 0,
             "avoid_collision": (np.arange(num_candidates) % 3 == 0) + 0.0,
             "expert_logits": rng.normal(size=num_candidates),
+            "objects": ("pear",),
             "seed": 7,
         }
         return Decision(**(fields | changes))

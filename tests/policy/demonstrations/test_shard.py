@@ -45,7 +45,7 @@ def test_what_is_written_is_read_again(shard_path):
         np.testing.assert_array_equal(
             found.look.features, looks[look].features.astype(np.float16).astype(np.float32)
         )
-        for name in ("phase", "relation", "side", "executed", "seed", "clears"):
+        for name in ("phase", "relation", "side", "executed", "seed", "clears", "objects"):
             assert getattr(found.decision, name) == getattr(decision, name)
         for name in ("valid", "avoid_collision", "expert_logits"):
             np.testing.assert_array_equal(getattr(found.decision, name), getattr(decision, name))
