@@ -114,7 +114,8 @@ def _describe(trainer: Any) -> None:
     config, split = trainer.config, trainer.split
     num_weights = sum(p.numel() for p in trainer.network.parameters())
     print(
-        f"Data    {len(split.train)} decisions to learn from, {len(split.val)} held out, of "
+        f"Data    {len(split.train)} decisions to learn from, {len(split.val)} held out"
+        f"{f', {len(split.new)} of new objects' if len(split.new) else ''}, of "
         f"{len(set(trainer.folder.scenes))} scenes in {config.data}\n"
         f"Network {config.variant}, {num_weights / 1e6:.2f} million weights, width "
         f"{trainer.network.config.width}, {trainer.network.config.max_points} points"

@@ -99,6 +99,11 @@ class DemonstrationFolder:
         return self._entries("clears")
 
     @cached_property
+    def objects(self) -> tuple[list[str], ...]:
+        """Objects of the catalogue that every demonstration's instruction means."""
+        return self._entries("objects")
+
+    @cached_property
     def num_candidates(self) -> tuple[int, ...]:
         """Number K of candidates of every demonstration."""
         return self._entries("num_candidates")

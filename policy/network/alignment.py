@@ -57,6 +57,9 @@ class LanguageAlignment(nn.Module):
         self.out = nn.Linear(width, width)
         self.norm = nn.LayerNorm(width)
         self._start_from_cosine_similarity(config)
+        if config.frozen_projections:
+            self.query.requires_grad_(False)
+            self.key.requires_grad_(False)
 
     def _start_from_cosine_similarity(self, config: SRConfig) -> None:
         # Image and text features share a space in which the cosine is the similarity, and that

@@ -99,6 +99,9 @@ class SRConfig(NetworkConfig):
             candidate. Departure: where nothing can be gripped at the mask, what is in the way has
             to be taken from beside it, and attention on what is at a candidate cannot tell how far
             off the mask is.
+        frozen_projections: Leave the projections of language and points in stage 1 as they begin:
+            equal and semi-orthogonal, so that they keep the cosines of the text space. Departure:
+            what is learnt of some objects' words and features need not hold for others.
         one_align: Stage 1, language to vision. Without it (BASE), stage 2 works on the visual
             features themselves.
         language_attention: "gate": the language asks, and its attention is a mask on the points.
@@ -130,6 +133,7 @@ class SRConfig(NetworkConfig):
     candidate_bias: bool = True
     mask_readout: bool = True
     mask_nearness: bool = True
+    frozen_projections: bool = False
     one_align: bool = True
     language_attention: LanguageAttention = "gate"
     dssa: bool = True
@@ -152,6 +156,11 @@ class SRConfig(NetworkConfig):
         self._check_choice("sparsifier", Sparsifier)
         self._check_choice("self_attention", SelfAttention)
         self._check_choice("language_attention", LanguageAttention)
+        if self.frozen_projections and not (self.one_align and self.language_attention == "gate"):
+            raise InvalidConfigError(
+                "frozen_projections: got True without the gate of stage 1, expected "
+                "one_align=True and language_attention=gate."
+            )
         if self.dssa and not self.one_align:
             raise InvalidConfigError(
                 "dssa: got True with one_align=False, expected dssa=False: DSSA refines what "

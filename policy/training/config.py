@@ -106,6 +106,9 @@ class TrainConfig:
     val_share: float = 0.1
     """Share of scenes held out for validation, chosen by a hash of their names: more data never
     moves a scene to the other side."""
+    new_share: float = 0.0
+    """Share of objects held out, chosen by a hash of their names: no decision that means one of
+    them is trained on, and metrics `new_...` tell how well the network chooses in these."""
     train_share: float = 1.0
     """Share of the training scenes to use, to see what more data would bring."""
     width: int | None = None
@@ -149,6 +152,7 @@ class TrainConfig:
         _check("lr", self.lr, self.lr > 0, "above 0")
         _check("averaging", self.averaging, 0 <= self.averaging < 1, "0 to below 1")
         _check("val_share", self.val_share, 0 < self.val_share < 1, "between 0 and 1")
+        _check("new_share", self.new_share, 0 <= self.new_share < 1, "0 to below 1")
         _check("train_share", self.train_share, 0 < self.train_share <= 1, "above 0, at most 1")
         _check("device", self.device, self.device in ("cpu", "cuda"), "cpu or cuda")
 

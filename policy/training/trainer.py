@@ -24,11 +24,11 @@ from policy.training.objective import Objective, Terms, compute_dtype
 from policy.training.order import epoch_batches
 from policy.training.schedule import rate_factor
 from policy.training.signals import StopSignal
-from policy.training.split import Split, split_by_scene
+from policy.training.split import Split, split_demonstrations
 from policy.training.state import Progress, load_state, save_state
 from policy.training.statistics import branch_weights, gate_entropy, gradient_norms
 from policy.training.store import DecisionStore, memory_free, memory_needed
-from policy.training.validation import Validator, stop_score
+from policy.training.validation import HeldOut, stop_score
 
 STATE_FILE = "state.safetensors"
 BEST_FILE = "best.safetensors"
@@ -63,8 +63,12 @@ class Trainer:
         """
         self.config, self.ranks, self.provenance = config, ranks, provenance
         self.folder = DemonstrationFolder(config.data)
-        self.split: Split = split_by_scene(
-            self.folder.scenes, val_share=config.val_share, train_share=config.train_share
+        self.split: Split = split_demonstrations(
+            self.folder.scenes,
+            self.folder.objects,
+            val_share=config.val_share,
+            train_share=config.train_share,
+            new_share=config.new_share,
         )
         network_config = config.network_config(self.folder.feature_dim)
         torch.manual_seed(config.seed)
@@ -72,9 +76,7 @@ class Trainer:
         self.averaged = copy.deepcopy(self.network).requires_grad_(False)
         store = DecisionStore(self.folder, network_config, in_memory=self._fits_memory())
         self.drawer = ExampleDrawer(store, config)
-        self.validator = Validator(
-            drawer=self.drawer, indices=self.split.val, batch=config.batch, ranks=ranks
-        )
+        self.held_out = HeldOut.of(self.split, self.drawer, batch=config.batch, ranks=ranks)
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=config.lr)
         dtype = compute_dtype(config.precision, config.device)
         weight = config.decoding_weight
@@ -187,7 +189,7 @@ class Trainer:
         """Validate, log, and keep the weights if they are the best so far."""
         progress = self.progress
         start = time.perf_counter()
-        metrics = self.validator.measure(self._validated)
+        metrics = self.held_out.measure(self._validated)
         score = stop_score(metrics, self.config.stop_on)
         progress.seconds += time.perf_counter() - start
         progress.bad_epochs += 1
@@ -202,6 +204,7 @@ class Trainer:
         log.add_epoch(row | metrics | branch_weights(self._kept_network()))
         shown = ("loss", "valid", "top1", "top1_pick", "top1_clear", "top1_place")
         found = {name: metrics[f"val_{name}"] for name in shown if f"val_{name}" in metrics}
+        found |= {name: metrics[name] for name in ("new_valid", "new_top1") if name in metrics}
         numbers = "  ".join(f"{name} {value:.3f}" for name, value in found.items())
         mark = "  best" if progress.bad_epochs == 0 else ""
         loss = f"train {train['train_choice']:.3f}  " if train else ""
@@ -214,7 +217,11 @@ class Trainer:
             "options": json.loads(json.dumps(dataclasses.asdict(config), default=str)),
             "data": {
                 "digest": self.folder.digest,
-                "decisions": {"train": len(split.train), "val": len(split.val)},
+                "decisions": {
+                    "train": len(split.train),
+                    "val": len(split.val),
+                    "new": len(split.new),
+                },
                 "scenes": {
                     "train": len(set(scenes[split.train])),
                     "val": len(set(scenes[split.val])),
@@ -236,10 +243,12 @@ class Trainer:
             return {}
         if self.config.resume and path.exists():
             return json.loads(path.read_text())
-        reference = self.validator.reference()
+        reference = self.held_out.reference()
         path.write_text(json.dumps(reference, indent=2) + "\n")
         for name, metrics in reference.items():
-            numbers = "  ".join(f"{key[4:]} {value:.3f}" for key, value in metrics.items())
+            numbers = "  ".join(
+                f"{key.removeprefix('val_')} {value:.3f}" for key, value in metrics.items()
+            )
             tqdm.write(f"{name:>9}  validation: {numbers}")
         return reference
 

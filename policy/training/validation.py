@@ -14,6 +14,7 @@ from policy.training.distributed import Ranks
 from policy.training.draws import ExampleDrawer, collate_examples
 from policy.training.objective import Objective
 from policy.training.order import sorted_batches
+from policy.training.split import Split
 from policy.training.statistics import gate_entropy
 
 _KINDS = ("pick", "clear", "place")
@@ -100,6 +101,70 @@ class Validator:
                 self.indices[kinds[self.indices] == kind], folder.num_candidates, batch=self.batch
             )
         ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldOut:
+    """Everything that is held out: decisions of other scenes, and those that mean new objects.
+
+    Attributes:
+        val: Measures on other scenes.
+        new: Measures on new objects, if any are held out.
+    """
+
+    val: Validator
+    new: Validator | None
+
+    @classmethod
+    def of(cls, split: Split, drawer: ExampleDrawer, *, batch: int, ranks: Ranks) -> "HeldOut":
+        """Measure on what a split holds out.
+
+        Args:
+            split: The split.
+            drawer: Makes the examples.
+            batch: Decisions a batch.
+            ranks: Processes that share the work.
+
+        Returns:
+            Both validators.
+        """
+        val, new = (
+            Validator(drawer=drawer, indices=indices, batch=batch, ranks=ranks)
+            for indices in (split.val, split.new)
+        )
+        return cls(val=val, new=new if len(split.new) else None)
+
+    def measure(self, objective: Objective) -> dict[str, float]:
+        """Measure a network.
+
+        Args:
+            objective: The network with its loss.
+
+        Returns:
+            What `Validator.measure` does, and the same of new objects as `new_...`.
+        """
+        metrics = self.val.measure(objective)
+        return metrics if self.new is None else metrics | _as_new(self.new.measure(objective))
+
+    def reference(self) -> dict[str, dict[str, float]]:
+        """Measure what needs no training.
+
+        Returns:
+            What `Validator.reference` does, and the same of new objects as `new_...`.
+        """
+        reference = self.val.reference()
+        if self.new is None:
+            return reference
+        found = self.new.reference()
+        return {name: own | _as_new(found[name]) for name, own in reference.items()}
+
+
+def _as_new(metrics: dict[str, float]) -> dict[str, float]:
+    return {
+        name.replace("val_", "new_"): value
+        for name, value in metrics.items()
+        if name.startswith("val_")
+    }
 
 
 def stop_score(metrics: dict[str, float], stop_on: StopOn) -> float:

@@ -104,6 +104,7 @@ def _decision(
         expert_logits=np.where(valid, 1.0, 0.0),
         seed=0,
         clears=phase == "pick" and target == OBJECTS - 1,
+        objects=(f"concept-{concepts[target]}",),
     )
 
 

@@ -73,7 +73,7 @@ def test_learns_what_is_asked_for(
     assert card["kind"] == variant and card["training"]["options"]["variant"] == variant
     kept = load_checkpoint(config.out / "best.safetensors", NETWORKS[variant])
     assert json.loads(json.dumps(asdict(kept.config))) == card["config"]
-    again = trainer.validator.measure(Objective(kept, config.decoding_weight, torch.float32))
+    again = trainer.held_out.measure(Objective(kept, config.decoding_weight, torch.float32))
     assert again["val_loss"] == pytest.approx(card["training"]["metrics"]["val_loss"], abs=0.02)
     assert plot._title(config.out) == {"a2": "A², seed 0", "vlg": "VLG, seed 0"}[variant]
 

@@ -8,7 +8,7 @@ import torch
 
 from policy.training.distributed import Ranks
 from policy.training.logs import read_table
-from policy.training.split import split_by_scene
+from policy.training.split import split_demonstrations
 from policy.training.trainer import Trainer
 
 OPTIONS = ("--threads", "1", "--width", "32", "--points", "24", "--no-tensorboard")
@@ -27,7 +27,7 @@ def test_two_processes_learn_like_one(scenes: Path, make_train_config, tmp_path:
 
     names = DemonstrationFolder(scenes).scenes
     # All but one: the second batch of every epoch leaves a process without a decision of its own.
-    batch = len(split_by_scene(names, val_share=0.25).train) - 1
+    batch = len(split_demonstrations(names, [()] * len(names), val_share=0.25).train) - 1
     config = make_train_config(out=tmp_path / "one", batch=batch, epochs=4, lr=1e-3)
     config.out.mkdir()
     from policy.training.logs import RunLog

@@ -80,8 +80,46 @@ def test_learns_what_words_mean(write_scenes, make_train_config, plain, tmp_path
     assert card["training"]["data"]["digest"] == trainer.folder.digest
     # What was kept is what was measured, but for rounding to half precision.
     kept = load_checkpoint(config.out / "best.safetensors", SRNetwork, encoder="synthetic-1")
-    again = trainer.validator.measure(Objective(kept, config.decoding_weight, torch.float32))
+    again = trainer.held_out.measure(Objective(kept, config.decoding_weight, torch.float32))
     assert again["val_loss"] == pytest.approx(metrics["val_loss"], abs=0.01)
+
+
+def test_what_was_never_meant_is_told_apart(
+    write_scenes, make_train_config, plain, tmp_path: Path
+) -> None:
+    """Of five concepts one is held out: how it looks can be learnt from nothing."""
+    data = write_scenes(tmp_path / "many", 48)
+    network = ("num_heads=4", "num_dssa_layers=1", "num_encoder_layers=0")
+    options = {"lr": 5e-3, "pick_positives": "target", "val_share": 0.15, "network": network}
+    config = make_train_config(data=data, epochs=8, new_share=0.36, **options, **plain)
+    trainer, _ = train(config)
+    objects = trainer.folder.objects
+    assert {name for index in trainer.split.new for name in objects[index]} == {"concept-0"}
+    rows = read_table(config.out / "epochs.csv")
+    assert rows[-1]["val_top1"] > 0.8 and rows[-1]["new_top1"] < 0.6
+    card = json.loads((config.out / "best.json").read_text())["training"]
+    assert card["data"]["decisions"]["new"] == len(trainer.split.new)
+    assert set(card["reference"]["random"]) >= {"val_top1", "new_top1", "new_top1_place"}
+
+
+def test_frozen_projections_stay_as_they_begin(make_train_config, tmp_path: Path) -> None:
+    kept = {}
+    for is_frozen in (False, True):
+        network = ("num_heads=4", f"frozen_projections={is_frozen}".lower())
+        config = make_train_config(out=tmp_path / str(is_frozen), epochs=1, network=network)
+        trainer = Trainer(config, ALONE, {})
+        stage = trainer.network.language_alignment
+        before = {name: w.detach().clone() for name, w in stage.named_parameters()}
+        train(config)
+        trained = load_checkpoint(config.out / "best.safetensors", SRNetwork)
+        kept[is_frozen] = before, dict(trained.language_alignment.named_parameters())
+    assert all(torch.equal(kept[False][0][name], w) for name, w in kept[True][0].items())
+    for is_frozen, (before, after) in kept.items():
+        for name in ("query.weight", "key.weight"):
+            # Weights are kept in half precision.
+            is_same = torch.equal(before[name].half(), after[name].half())
+            assert is_same == is_frozen
+        assert not torch.equal(before["value.weight"].half(), after["value.weight"].half())
 
 
 def test_an_interrupted_run_is_like_an_unbroken_one(make_train_config, tmp_path: Path) -> None:
@@ -138,4 +176,4 @@ def test_the_ablations_train(variant: str, make_train_config) -> None:
 def test_validation_is_held_out_by_scene(make_train_config) -> None:
     trainer = Trainer(make_train_config(), ALONE, {})
     scenes = np.array(trainer.folder.scenes)
-    assert not set(scenes[trainer.split.train]) & set(scenes[trainer.validator.indices])
+    assert not set(scenes[trainer.split.train]) & set(scenes[trainer.held_out.val.indices])
