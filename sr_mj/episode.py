@@ -205,7 +205,9 @@ def _assess_places(
     return assess(scene, pipeline, rngs, place_text(scene.goal.text), propose, describe_held)
 
 
-def _inside(zone: Workspace, candidates: ActionCandidates) -> ActionCandidates:
+def _inside(zone: Workspace | None, candidates: ActionCandidates) -> ActionCandidates:
+    if zone is None:
+        return candidates
     return candidates.take(np.flatnonzero(zone.contains_xy(candidates.positions)))
 
 

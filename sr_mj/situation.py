@@ -27,8 +27,8 @@ class Situation:
     Attributes:
         text: What the instruction says about this phase.
         views: What the cameras saw.
-        percept: What was made of it, its features being those of the phase's zone; None if no
-            object was in sight there.
+        percept: What was made of it, its features being those in the phase's zone if there is one;
+            None if no object was in sight there.
         proposed: All actions that were proposed; None if there was no percept.
         candidates: Those among them that the policy may choose.
         held: What is in the gripper, as far as it was seen; for placing only.
@@ -73,11 +73,12 @@ def assess(
             percept = pipeline.lifter.perceive(views, text.text, unwanted=text.unwanted)
     except EmptyCloudError:
         return Situation(text=text, views=views, seconds=watch.seconds)
-    # Obstacles are everywhere, what the sentence is about in this phase's zone only.
-    is_inside = zone.contains_xy(percept.features.points)
-    if not is_inside.any():
-        return Situation(text=text, views=views, seconds=watch.seconds)
-    percept = replace(percept, features=percept.features.take(is_inside))
+    if zone is not None:
+        # Obstacles are everywhere, what the sentence is about in this phase's zone only.
+        is_inside = zone.contains_xy(percept.features.points)
+        if not is_inside.any():
+            return Situation(text=text, views=views, seconds=watch.seconds)
+        percept = replace(percept, features=percept.features.take(is_inside))
     with watch.measure("propose"):
         held = None if describe_held is None else describe_held(percept.geometry)
         proposed = propose(percept.geometry, held)

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Callable, Collection
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -101,9 +101,21 @@ def load_checkpoint(
         reason = str(error).strip().splitlines()[0]
         raise InvalidCheckpointError(
             f"{path}: got weights that don't fit their card ({reason}), expected those that "
-            f"{card_path.name} describes. Save both again with save_checkpoint."
+            f"{card_path.name} describes. {_advice(card_path, network_type.config_type)}"
         ) from error
     return network.eval()
+
+
+def _advice(card_path: Path, config_type: type[NetworkConfig]) -> str:
+    """Say what to do about weights that don't fit, which may be older than an option."""
+    told = json.loads(card_path.read_text())["config"]
+    untold = [field.name for field in fields(config_type) if field.name not in told]
+    if not untold:
+        return "Save both again with save_checkpoint."
+    return (
+        f"The card is of an earlier version and does not tell {', '.join(untold)}: train anew, or "
+        "write into its config what the weights have."
+    )
 
 
 def _replace(path: Path, write: Callable[[Path], object]) -> None:

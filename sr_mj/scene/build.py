@@ -86,20 +86,20 @@ class Scene:
         """Box that the objects started in."""
         return self.config.kind.workspace
 
-    def zone(self, phase: ActionKind) -> Workspace:
-        """Return the box in which a phase of the goal takes place.
+    def zone(self, phase: ActionKind) -> Workspace | None:
+        """Return the part of the workspace that a phase of the goal keeps to.
 
         Args:
             phase: Pick or place.
 
         Returns:
-            The kind's zone for it, where there are zones and the goal is to pick something and to
-            place it; otherwise the whole workspace.
+            The kind's zone for it if the goal is to pick something and to place it; None if there
+            are no zones, or the goal has one phase alone.
         """
         kind = self.config.kind
         zone = kind.pick_zone if phase == "pick" else kind.place_zone
         is_for_both = self.goal.place is not None and names_target(self.goal.text)
-        return zone if zone is not None and is_for_both else self.workspace
+        return zone if is_for_both else None
 
     def T_world_object(self, name: str) -> np.ndarray:
         """Return the (4, 4) pose of an object's frame in the world. Ground truth."""

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import load_file, save_file
 
 from policy.base import Policy
 from policy.errors import InvalidArrayError, InvalidCheckpointError
@@ -176,6 +177,20 @@ def test_weights_that_do_not_fit(untrained: SRPolicy, tmp_path: Path) -> None:
         f"{path}: got weights that don't fit their card (Error(s) in loading state_dict for "
         "SRNetwork:), expected those that sr.json describes. Save both again with save_checkpoint."
     )
+    # Weights from before there was an option that adds to them.
+    old = {k: v for k, v in good["config"].items() if k != "mask_nearness"}
+    card.write_text(json.dumps(good | {"config": old}))
+    weights = load_file(path)
+    del weights["evidence.nearness_weight"]
+    save_file(weights, path)
+    with pytest.raises(InvalidCheckpointError) as caught:
+        load_policy("sr", checkpoint=path)
+    assert str(caught.value).endswith(
+        "The card is of an earlier version and does not tell mask_nearness: train anew, or write "
+        "into its config what the weights have."
+    )
+    card.write_text(json.dumps(good | {"config": old | {"mask_nearness": False}}))
+    assert isinstance(load_policy("sr", checkpoint=path), SRPolicy)
     card.write_text(json.dumps(good))
     path.write_bytes(b"not weights")
     with pytest.raises(InvalidCheckpointError, match="weights that don't fit their card"):
