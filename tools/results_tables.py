@@ -44,7 +44,10 @@ Cells = dict[tuple[str, str], dict[str, Score]]
 class TablesConfig:
     """Options of `python -m tools.results_tables`."""
 
-    results: tuple[Path, ...] = (Path("docs/results/arrangements"),)
+    results: tuple[Path, ...] = (
+        Path("docs/results/arrangements"),
+        Path("docs/results/first-grasps"),
+    )
     """Folders of results that are counted together."""
     documents: tuple[Path, ...] = (Path("README.md"), Path("docs/results.md"))
     """Documents to fill in."""
@@ -74,11 +77,15 @@ def markdown(heading: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def clean_scores(lines: Lines) -> Cells:
-    """Count successes under plain conditions."""
-    return {
-        (group.task, group.split): {label: score(label, own) for label, own in found.items()}
-        for group, found in _clean(lines).items()
-    }
+    """Count successes under plain conditions, of policies that ran all arrangements of a suite."""
+    cells = {}
+    for group, found in _clean(lines).items():
+        scores = {label: score(label, own) for label, own in found.items()}
+        every = max(s.num_scenes for s in scores.values())
+        cells[group.task, group.split] = {
+            label: s for label, s in scores.items() if s.num_scenes == every
+        }
+    return cells
 
 
 def overview(lines: Lines) -> str:
@@ -124,12 +131,26 @@ def task_table(task: str) -> Callable[[Lines], str]:
     return table
 
 
+def first_grasps(lines: Lines) -> str:
+    """Return grasping on the seen arrangements that the policies without weights have run."""
+    found = next(own for g, own in _clean(lines).items() if (g.task, g.split) == ("grasp", "seen"))
+    scenes = {record["scene"] for record in found["clip-grounding"]}
+    rows = []
+    for label in (label for label in ORDER if label in found):
+        s = score(label, [record for record in found[label] if record["scene"] in scenes])
+        paper = _published("grasp", label, "seen").replace(", ", " / ").strip("*")
+        rows.append([_title(label), percent(s.success), f"{s.steps:.2f}", paper])
+    return markdown(["policy", f"{len(scenes)} seen arrangements", "steps", "paper"], rows)
+
+
 def differences(lines: Lines) -> str:
     """Return what SR does better than each other policy, with both intervals."""
     cells: dict[tuple[str, str], dict[str, str]] = {}
+    scores = clean_scores(lines)
     for group, policies in _clean(lines).items():
         found = {}
-        for c in compare(policies):
+        known = scores[group.task, group.split]
+        for c in compare({label: own for label, own in policies.items() if label in known}):
             value = f"{c.success.value * 100:.1f}".replace("-0.0", "0.0")
             found[c.against] = f"{value} {points(c.success)}, {points(c.success_elsewhere)}"
         cells[group.task, group.split] = found
@@ -145,6 +166,7 @@ def differences(lines: Lines) -> str:
 BLOCKS: dict[str, Callable[[Lines], str]] = {
     "overview": overview,
     **{task: task_table(task) for task in TASKS},
+    "first-grasps": first_grasps,
     "differences": differences,
 }
 
