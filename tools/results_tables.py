@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tyro
-
+from sr_mj.cli import run_command
 from sr_mj.evaluation.published import TABLE_1, TABLE_3, kind_of_policy
 from sr_mj.evaluation.results import Lines, read_lines
 from sr_mj.evaluation.statistics import Interval
@@ -257,4 +256,4 @@ def main(config: TablesConfig) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(TablesConfig, description=__doc__)))
+    run_command(TablesConfig, main, __doc__ or "")
