@@ -113,8 +113,8 @@ def _advice(card_path: Path, config_type: type[NetworkConfig]) -> str:
     if not untold:
         return "Save both again with save_checkpoint."
     return (
-        f"The card is of an earlier version and does not tell {', '.join(untold)}: train anew, or "
-        "write into its config what the weights have."
+        "Save both again with save_checkpoint. If the weights are of an earlier version, whose card "
+        f"does not tell {', '.join(untold)}: train anew, or write into its config what they have."
     )
 
 

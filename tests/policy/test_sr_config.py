@@ -31,6 +31,14 @@ from policy.network.config import SRConfig, ablation_switches
             "dssa: got True with one_align=False, expected dssa=False: DSSA refines what stage 1 "
             "puts out.",
         ),
+        *(
+            (
+                {"frozen_projections": True, "dssa": False} | change,
+                "frozen_projections: got True without the gate of stage 1, expected "
+                "one_align=True and language_attention=gate.",
+            )
+            for change in ({"one_align": False}, {"language_attention": "points"})
+        ),
     ],
 )
 def test_bad_config(changes: dict[str, Any], message: str) -> None:

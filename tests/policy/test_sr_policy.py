@@ -186,8 +186,8 @@ def test_weights_that_do_not_fit(untrained: SRPolicy, tmp_path: Path) -> None:
     with pytest.raises(InvalidCheckpointError) as caught:
         load_policy("sr", checkpoint=path)
     assert str(caught.value).endswith(
-        "The card is of an earlier version and does not tell mask_nearness: train anew, or write "
-        "into its config what the weights have."
+        "Save both again with save_checkpoint. If the weights are of an earlier version, whose card "
+        "does not tell mask_nearness: train anew, or write into its config what they have."
     )
     card.write_text(json.dumps(good | {"config": old | {"mask_nearness": False}}))
     assert isinstance(load_policy("sr", checkpoint=path), SRPolicy)
