@@ -113,8 +113,9 @@ def _advice(card_path: Path, config_type: type[NetworkConfig]) -> str:
     if not untold:
         return "Save both again with save_checkpoint."
     return (
-        "Save both again with save_checkpoint. If the weights are of an earlier version, whose card "
-        f"does not tell {', '.join(untold)}: train anew, or write into its config what they have."
+        "Save both again with save_checkpoint. If the weights are of an earlier version, whose "
+        f"card does not tell {', '.join(untold)}: train anew, or write into its config what they "
+        "have."
     )
 
 
