@@ -49,18 +49,17 @@ class SceneObjects:
         """Return the number S of segments."""
         return len(self.features)
 
-    def moved(self, T: Float[np.ndarray, "4 4"], gain: Float[np.ndarray, " C"]) -> "SceneObjects":
-        """Move the segments about the vertical, and scale the channels of their features.
+    def moved(self, T: Float[np.ndarray, "4 4"]) -> "SceneObjects":
+        """Move the segments about the vertical.
 
         Args:
             T: Transform of the world that leaves the vertical as it is.
-            gain: Factor of each channel.
 
         Returns:
             The segments as they would have been seen.
         """
         positions = self.positions @ T[:3, :3].T + T[:3, 3]
-        return replace(self, positions=positions, features=self.features * gain)
+        return replace(self, positions=positions)
 
     def normalised(
         self, center: Float[np.ndarray, "3"], half: Float[np.ndarray, "3"]

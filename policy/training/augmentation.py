@@ -1,7 +1,7 @@
 """Changes of a decision that leave its labels true."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -37,18 +37,20 @@ def augment(
     angle = rng.uniform(-1, 1) * math.radians(config.rotation_deg)
     center = (observation.workspace_min + observation.workspace_max) / 2
     T = rotation_about_vertical(center, angle)
-    gain = channel_gain(observation.feature_dim, config.feature_dropout, rng)
-    phrase = observation.phrase_pooled
+    change = draw_channel_change(observation.feature_dim, config, rng)
+    phrase, objects = observation.phrase_pooled, observation.objects
     changed = replace(
         observation,
         points=points @ T[:3, :3].T + T[:3, 3],
-        features=observation.features[kept] * gain,
+        features=change(observation.features[kept]),
         similarity=observation.similarity[kept],
         confidence=observation.confidence[kept],
-        text_tokens=observation.text_tokens * gain,
-        text_pooled=observation.text_pooled * gain,
-        phrase_pooled=None if phrase is None else phrase * gain,
-        objects=None if observation.objects is None else observation.objects.moved(T, gain),
+        text_tokens=change(observation.text_tokens),
+        text_pooled=change(observation.text_pooled),
+        phrase_pooled=None if phrase is None else change(phrase),
+        objects=None
+        if objects is None
+        else replace(objects.moved(T), features=change(objects.features)),
     )
     noise = rng.normal(scale=config.prior_noise, size=len(candidates))
     moved = replace(
@@ -97,21 +99,52 @@ def kept_points(
     return np.sort(rng.permutation(num_points)[:num_kept])
 
 
-def channel_gain(
-    num_channels: int, share: float, rng: np.random.Generator
-) -> Float[np.ndarray, " C"]:
-    """Factors that switch channels off.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ChannelChange:
+    """A change of feature channels, the same for points and texts.
 
-    The same for points and texts: a channel that only one side lacks would make their cosine
-    meaningless.
+    What happens to one side only would make their cosines meaningless.
+
+    Attributes:
+        order: (C,) which channel comes to stand where.
+        factor: (C,) what it is multiplied with.
+    """
+
+    order: np.ndarray
+    factor: np.ndarray
+
+    def __call__(self, features: Float[np.ndarray, "*rows C"]) -> Float[np.ndarray, "*rows C"]:
+        """Change features.
+
+        Args:
+            features: Of points, objects or texts.
+
+        Returns:
+            The changed ones.
+        """
+        return features[..., self.order] * self.factor
+
+
+def draw_channel_change(
+    num_channels: int, config: AugmentationConfig, rng: np.random.Generator
+) -> ChannelChange:
+    """Draw which channels are switched off, and whether channels change places and signs.
+
+    Both keep products of two features, the first on average, the second exactly: exchanging
+    channels and their signs is an orthogonal map.
 
     Args:
         num_channels: Number C of channels.
-        share: Probability of each channel to be switched off.
-        rng: Draws the channels.
+        config: `feature_dropout` and `channel_shuffle`.
+        rng: Draws them; how often depends on the number of channels alone.
 
     Returns:
-        Zeros, and 1 / sqrt(1 - share) elsewhere, which keeps products on average.
+        The change.
     """
-    is_on = rng.random(num_channels) >= share
-    return is_on / math.sqrt(1 - share)
+    is_on = rng.random(num_channels) >= config.feature_dropout
+    factor = is_on / math.sqrt(1 - config.feature_dropout)
+    is_shuffled = rng.random() < config.channel_shuffle
+    order, signs = rng.permutation(num_channels), rng.choice([-1.0, 1.0], size=num_channels)
+    if not is_shuffled:
+        return ChannelChange(order=np.arange(num_channels), factor=factor)
+    return ChannelChange(order=order, factor=factor * signs)

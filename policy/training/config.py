@@ -35,6 +35,10 @@ class AugmentationConfig:
     feature_dropout: float = 0.1
     """Share of feature channels set to zero, the same for points and texts; the others grow so
     that cosines keep their size on average."""
+    channel_shuffle: float = 0.0
+    """Share of draws in which feature channels change places and signs, the same ones for points
+    and texts. Cosines stay, but no channel means anything any more: what is learnt has to rest on
+    how well texts and points agree, not on what single objects look like or are called."""
     prior_noise: float = 0.05
     """Standard deviation of an error added to the candidates' geometric quality."""
     paraphrases: float = 0.5
@@ -51,6 +55,7 @@ class AugmentationConfig:
             ("jitter_m", 0.05),
             ("point_dropout", 0.9),
             ("feature_dropout", 0.9),
+            ("channel_shuffle", 1.0),
             ("prior_noise", 1.0),
             ("paraphrases", 1.0),
         ):
@@ -210,6 +215,7 @@ NO_AUGMENTATION = AugmentationConfig(
     jitter_m=0.0,
     point_dropout=0.0,
     feature_dropout=0.0,
+    channel_shuffle=0.0,
     prior_noise=0.0,
     paraphrases=0.0,
 )

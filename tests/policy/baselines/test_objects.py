@@ -6,6 +6,7 @@ import pytest
 
 from policy.errors import InvalidArrayError
 from policy.objects import SceneObjects, find_objects, object_labels
+from policy.training.augmentation import ChannelChange
 
 
 @pytest.fixture
@@ -41,16 +42,17 @@ def test_objects_of_blocks(scene) -> None:
 
 
 def test_what_is_seen_moved_is_what_was_seen_and_moved(scene) -> None:
-    """Turning and scaling afterwards is turning and scaling first; segments are found once."""
+    """Turning and changing channels afterwards is doing so first; segments are found once."""
     angle = 0.7
     T = np.eye(4)
     T[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
     T[:3, 3] = [0.05, -0.03, 0.0]
-    gain = np.linspace(0, 2, 16)
+    change = ChannelChange(order=np.roll(np.arange(16), 3), factor=np.linspace(-1, 2, 16))
     moved = replace(
-        scene, points=scene.points @ T[:3, :3].T + T[:3, 3], features=scene.features * gain
+        scene, points=scene.points @ T[:3, :3].T + T[:3, 3], features=change(scene.features)
     )
-    first, second = _find(moved), _find(scene).moved(T, gain)
+    first, second = _find(moved), _find(scene).moved(T)
+    second = replace(second, features=change(second.features))
     one, two = (np.argsort(found.positions[:, 0]) for found in (first, second))
     np.testing.assert_allclose(first.features[one], second.features[two], atol=1e-6)
     np.testing.assert_allclose(first.similarity[one], second.similarity[two], atol=1e-6)

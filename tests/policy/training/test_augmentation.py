@@ -5,7 +5,12 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-from policy.training.augmentation import augment, channel_gain, kept_points, rotation_about_vertical
+from policy.training.augmentation import (
+    augment,
+    draw_channel_change,
+    kept_points,
+    rotation_about_vertical,
+)
 from policy.training.config import NO_AUGMENTATION
 
 
@@ -106,8 +111,40 @@ def test_feature_dropout_hits_points_and_texts_alike(scene, rng) -> None:
 
 def test_feature_dropout_keeps_cosines_on_average(rng) -> None:
     a, b = rng.normal(size=(2, 64))
-    products = [(a * g) @ (b * g) for g in (channel_gain(64, 0.2, rng) for _ in range(4000))]
+    options = _options(feature_dropout=0.2, channel_shuffle=0.5)
+    changes = [draw_channel_change(64, options, rng) for _ in range(4000)]
+    products = [change(a) @ change(b) for change in changes]
     assert np.mean(products) == pytest.approx(a @ b, abs=5 * np.std(products) / math.sqrt(4000))
+
+
+def test_shuffled_channels_keep_every_product(scene, rng) -> None:
+    """Nothing that a cosine says is lost, and what a channel says is."""
+    observation, _ = scene
+    changed, _ = augment(*scene, _options(channel_shuffle=1.0), rng, max_points=1000)
+    for text in ("text_tokens", "text_pooled"):
+        np.testing.assert_allclose(
+            getattr(changed, text) @ changed.features.T,
+            getattr(observation, text) @ observation.features.T,
+            atol=1e-5,
+        )
+    np.testing.assert_allclose(
+        changed.features @ changed.features.T, observation.features @ observation.features.T,
+        atol=1e-5,
+    )  # fmt: skip
+    size = np.sort(np.abs(observation.features), axis=1)
+    np.testing.assert_array_equal(np.sort(np.abs(changed.features), axis=1), size)
+    assert (np.abs(changed.features) != np.abs(observation.features)).mean() > 0.5
+    assert (np.sort(changed.features, axis=1) != np.sort(observation.features, axis=1)).any()
+    np.testing.assert_array_equal(changed.points, observation.points)
+    np.testing.assert_array_equal(changed.similarity, observation.similarity)
+
+
+def test_share_of_draws_with_shuffled_channels(rng) -> None:
+    changes = [draw_channel_change(8, _options(channel_shuffle=0.25), rng) for _ in range(2000)]
+    is_shuffled = [(change.order != np.arange(8)).any() for change in changes]
+    assert np.mean(is_shuffled) == pytest.approx(0.25, abs=0.05)
+    plain = [change for change, is_ in zip(changes, is_shuffled, strict=True) if not is_]
+    assert all((change.factor == 1).all() for change in plain)
 
 
 def test_jitter_has_its_standard_deviation(make_observation, make_candidates, rng) -> None:
