@@ -166,7 +166,7 @@ def _noise(scores: Scores) -> Table:
         printed = (_printed(figures.get(condition)) for condition in conditions)
         rows.append((f"published: {name}", *printed))
     labels = dict.fromkeys(s.policy for g, own in scores.items() if _is_noisy(g) for s in own)
-    stands_for = {policy: name for name, (policy, _) in TABLE_4.items()}
+    stands_for = {kind: name for name, (kinds, _) in TABLE_4.items() for kind in kinds}
     for label in labels:
         found = (
             _find(scores, Group(task="grasp", split="unseen", condition=c), label)

@@ -114,11 +114,11 @@ TABLE_2 = {
 """SR by instruction: success (0 to 1), steps, steps of successes, reward."""
 
 TABLE_4 = {
-    "ReLU": ("relu", (84.3, 77.1, 66.4)),
-    "Softmax": ("softmax", (83.5, 74.8, 70.2)),
-    "ReLU²": ("sr", (86.7, 78.1, 71.3)),
+    "ReLU": (("relu",), (84.3, 77.1, 66.4)),
+    "Softmax": (("softmax",), (83.5, 74.8, 70.2)),
+    "ReLU²": (("relu2", "sr"), (86.7, 78.1, 71.3)),
 }
-"""Unseen grasping under noise of points by sparsifier: our policy, light, middle and heavy."""
+"""Unseen grasping under noise of points by sparsifier: our policies, light, middle and heavy."""
 
 TABLE_4_LEVELS = {"light": "points-0.1", "middle": "points-0.2", "heavy": "points-0.3"}
 """The conditions of ours that stand for the paper's levels."""

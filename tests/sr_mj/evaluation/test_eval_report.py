@@ -1,4 +1,5 @@
 import csv
+import dataclasses
 import io
 import re
 from dataclasses import replace
@@ -261,7 +262,12 @@ def test_ours_stand_beside_what_was_published(tmp_path, dones, as_lines, make_do
         make_done("sr", seed, scene="grasp-unseen-00", split="unseen", condition="points-0.1")
         for seed in range(4)
     ]
-    write_report(tmp_path, as_lines([*dones, *noisy]), {})
+    others = {
+        dataclasses.replace(done.episode, policy=label): done.record | {"policy": label}
+        for done in noisy
+        for label in ("sr@relu", "sr@relu2")
+    }
+    write_report(tmp_path, as_lines([*dones, *noisy]) | others, {})
     tables = tmp_path / "tables"
     rows = list(csv.DictReader((tables / "paper-1.csv").open()))
     assert len(rows) == len(TABLE_1) + 2
@@ -277,8 +283,9 @@ def test_ours_stand_beside_what_was_published(tmp_path, dones, as_lines, make_do
     assert "| I need a fruit | 90 | 3.3 |" in shown
     rows = {r["sparsifier"]: r for r in csv.DictReader((tables / "paper-4.csv").open())}
     assert rows["published: ReLU²"]["points-0.1"] == "86.7"
-    assert rows["ours: sr (ReLU²)"]["points-0.1"] == "1.0"
-    assert rows["ours: sr (ReLU²)"]["clean"] == ""
+    for name in ("sr (ReLU²)", "sr@relu2 (ReLU²)", "sr@relu (ReLU)"):
+        assert rows[f"ours: {name}"]["points-0.1"] == "1.0"
+        assert rows[f"ours: {name}"]["clean"] == ""
 
 
 def test_random_scenes_are_not_set_beside_what_was_published(tmp_path, make_done, as_lines):
