@@ -3,6 +3,7 @@
     python -m tools.bench.policies --policies oracle grounding random --seeds 0 20
     python -m tools.bench.policies --policies oracle --scene place8 --seeds 100 130
     python -m tools.bench.policies --policies oracle --suite place --split unseen --seeds 0 15
+    python -m tools.bench.policies --policies sr a2 --suite grasp --conditions points-0.1 l515-2x
 
 For development: unlike `python -m sr_mj.eval`, whose harness this uses, it runs only the policies
 that are named, and scenes `place8` and `pickplace8` get random goals with a place part. Episodes
@@ -10,14 +11,13 @@ are kept as they end, and those that the folder already has are skipped. Prints 
 Wilson intervals, the causes of failure, and how attempts ended.
 """
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import tyro
 from tqdm import tqdm
 
+from sr_mj.cli import run_command
 from sr_mj.evaluation.statistics import wilson
 from sr_mj.gl import select_backend
 
@@ -42,8 +42,7 @@ class BenchConfig:
         split: Objects.
         seeds: First seed and one past the last.
         attempts: Grasps an episode.
-        perturb_cm: Standard deviation of an error added to executed positions.
-        perturb_deg: Standard deviation of an error added to executed orientations.
+        conditions: What is made harder, as in docs/evaluation.md.
         encoder: Image and text encoder. Policies that do not look, oracle and random, are spared
             it in any case; "blank" spares it to all.
         workers: Processes.
@@ -56,8 +55,7 @@ class BenchConfig:
     split: Literal["seen", "unseen"] = "seen"
     seeds: tuple[int, int] = (0, 20)
     attempts: int = 8
-    perturb_cm: float = 0.0
-    perturb_deg: float = 0.0
+    conditions: tuple[str, ...] = ("clean",)
     encoder: str = "embedded"
     workers: int = 1
     out: Path = Path("outputs/policies")
@@ -109,9 +107,7 @@ def bench_episodes(config: BenchConfig, setting: "Setting") -> "tuple[Episode, .
     """List the episodes."""
     from sr_mj.evaluation.plan import plan_random, plan_suites
 
-    is_perturbed = config.perturb_cm or config.perturb_deg
-    pose = f"pose-{config.perturb_cm:g}cm-{config.perturb_deg:g}deg"
-    conditions, seeds = (pose if is_perturbed else "clean",), range(*config.seeds)
+    conditions, seeds = config.conditions, range(*config.seeds)
     if config.suite is None:
         return plan_random(
             config.scene, config.split, seeds, setting.policies, conditions=conditions
@@ -162,9 +158,11 @@ def main(config: BenchConfig) -> int:
         for done in tqdm(running, desc="episodes", total=len(missing)):
             folder.add(done)
         folder.finish()
-        report([folder.lines[episode] for episode in episodes])
+        for condition in dict.fromkeys(episode.condition for episode in episodes):
+            print(condition)
+            report([folder.lines[e] for e in episodes if e.condition == condition])
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(tyro.cli(BenchConfig, description=__doc__)))
+    run_command(BenchConfig, main, __doc__ or "")
