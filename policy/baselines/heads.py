@@ -12,6 +12,7 @@ from policy.network.batch import PHASES, DecisionBatch
 from policy.network.config import NetworkConfig
 from policy.network.decoder import ActionDecoder, NetworkOutput
 from policy.network.encoding import fourier_features, mlp, num_fourier_features
+from policy.network.mixing import MixingModule
 
 # As in the SR network: between two grasps of one object.
 _INITIAL_PRIOR_WEIGHT = 2.0
@@ -74,7 +75,7 @@ class CandidateTokens(nn.Module):
         return batch.phase if self.uses_side else batch.phase.clamp(max=1)
 
 
-class CandidateScores(nn.Module):
+class CandidateScores(MixingModule):
     """A three-layer MLP gives the score, with the prior added, and the same decoder as SR's."""
 
     def __init__(self, config: BaselineConfig) -> None:

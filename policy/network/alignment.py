@@ -11,6 +11,7 @@ from policy.network.batch import PHASES, DecisionBatch
 from policy.network.bias import CandidateBias
 from policy.network.config import SRConfig
 from policy.network.encoding import fourier_features, mlp, num_fourier_features
+from policy.network.mixing import MixingModule
 from policy.network.projections import merge_heads, split_heads
 
 # Score that a cosine similarity of 1 starts with in the semantic mask. CLIP's own temperature
@@ -24,7 +25,7 @@ _INITIAL_POOLED_ADVANTAGE = 2.0
 _INITIAL_SIMILARITY_SHARPNESS = 8.0
 
 
-class LanguageAlignment(nn.Module):
+class LanguageAlignment(MixingModule):
     """Stage 1 (1-Align): the instruction gates the points, head by head.
 
     Eq. (5) as printed turns T language queries into T rows, while eq. (6) and the DSSA need one

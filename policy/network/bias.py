@@ -6,6 +6,8 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
+from policy.network.mixing import MixingModule
+
 # Normalised units: 0.02 is about a point spacing (5 mm in the standard workspace), 1 half of the
 # workspace. Log-spaced between them, since a centimetre matters near a point and not far away.
 _SHORTEST, _LONGEST = 0.02, 1.0
@@ -112,7 +114,7 @@ def _signed(delta: Float[Tensor, "batch axes rows cols"]) -> Tensor:
     return delta / (delta.abs() + _NEAR)
 
 
-class RelativePositionBias(nn.Module):
+class RelativePositionBias(MixingModule):
     """B of eq. (8): for every head, a learnt mixture of the position basis."""
 
     def __init__(self, num_heads: int, num_scales: int) -> None:
@@ -142,7 +144,7 @@ class RelativePositionBias(nn.Module):
         return torch.bmm(weight, basis.flatten(2)).view(batch, -1, rows, cols)
 
 
-class CandidateBias(nn.Module):
+class CandidateBias(MixingModule):
     """The bias of stage 2: for every phase and head, a learnt mixture of the candidate basis."""
 
     def __init__(self, num_phases: int, num_heads: int, num_scales: int) -> None:

@@ -8,6 +8,7 @@ from torch import Tensor, nn
 
 from policy.network.bias import RelativePositionBias
 from policy.network.config import Sparsifier
+from policy.network.mixing import MixingModule
 from policy.network.projections import merge_heads, split_heads
 
 # Score of padding: far below any other, yet finite in half precision.
@@ -80,7 +81,7 @@ def sparsify(
     return weights * weights if sparsifier == "relu2" else weights  # eq. (10)
 
 
-class DSSALayer(nn.Module):
+class DSSALayer(MixingModule):
     """One layer of dense-sparse self-attention with residual and layer norm."""
 
     def __init__(self, width: int, num_heads: int, num_scales: int, sparsifier: Sparsifier) -> None:

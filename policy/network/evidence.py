@@ -11,6 +11,7 @@ from torch.nn.functional import softplus
 from policy.network.batch import PHASES
 from policy.network.bias import nearest_scale
 from policy.network.config import SRConfig
+from policy.network.mixing import MixingModule
 
 # Weight of the prior at the start, in units of logit: between two grasps of one object.
 _INITIAL_PRIOR_WEIGHT = 2.0
@@ -39,7 +40,7 @@ class Evidence:
     nearness: Tensor | None
 
 
-class CandidateEvidence(nn.Module):
+class CandidateEvidence(MixingModule):
     """Adds to the logits what is known of a candidate without the network."""
 
     def __init__(self, config: SRConfig) -> None:

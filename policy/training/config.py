@@ -100,6 +100,9 @@ class TrainConfig:
     the weights themselves."""
     clip: float = 5.0
     """Largest norm of the gradient; 0 leaves it as it is."""
+    mixing_rate: float = 1.0
+    """Learning rate of the weights that mix scores (of the biases, of the mask, of what is added to
+    the logits, of DSSA's branches), as a multiple of --lr."""
     decoding_weight: float = 0.1
     """Weight of opening, rotation and collision flag beside the choice of the candidate."""
     pick_positives: PickPositives = "closest"
@@ -154,7 +157,8 @@ class TrainConfig:
             "save_every_s",
         ):  # fmt: skip
             _check(name, getattr(self, name), getattr(self, name) >= 0, "at least 0")
-        _check("lr", self.lr, self.lr > 0, "above 0")
+        for name in ("lr", "mixing_rate"):
+            _check(name, getattr(self, name), getattr(self, name) > 0, "above 0")
         _check("averaging", self.averaging, 0 <= self.averaging < 1, "0 to below 1")
         _check("val_share", self.val_share, 0 < self.val_share < 1, "between 0 and 1")
         _check("new_share", self.new_share, 0 <= self.new_share < 1, "0 to below 1")

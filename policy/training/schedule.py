@@ -1,7 +1,11 @@
-"""The learning rate over a run."""
+"""The learning rate over a run, and over the parts of a network."""
 
 import math
+from typing import Any
 
+from torch import nn
+
+from policy.network.mixing import mixing_weights
 from policy.training.config import Schedule
 
 
@@ -24,3 +28,21 @@ def rate_factor(step: int, *, schedule: Schedule, warmup: int, num_steps: int) -
     # The step after the last one would be at zero: every step that is made moves the weights.
     done = (step - warmup) / max(num_steps - warmup, 1)
     return 0.5 * (1 + math.cos(math.pi * min(done, 1.0)))
+
+
+def rate_groups(network: nn.Module, mixing_rate: float) -> list[dict[str, Any]]:
+    """Divide the parameters of a network by how fast they learn.
+
+    Args:
+        network: The network.
+        mixing_rate: Rate of its mixing weights, as a multiple of that of the others.
+
+    Returns:
+        Groups for an optimizer; `factor` tells what to multiply its learning rate with.
+    """
+    mixing = mixing_weights(network)
+    others = [p for name, p in network.named_parameters() if name not in mixing]
+    return [
+        {"params": others, "factor": 1.0},
+        {"params": list(mixing.values()), "factor": mixing_rate},
+    ]

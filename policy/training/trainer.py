@@ -22,7 +22,7 @@ from policy.training.feed import feed
 from policy.training.logs import RunLog
 from policy.training.objective import Objective, Terms, compute_dtype
 from policy.training.order import epoch_batches
-from policy.training.schedule import rate_factor
+from policy.training.schedule import rate_factor, rate_groups
 from policy.training.signals import StopSignal
 from policy.training.split import Split, split_demonstrations
 from policy.training.state import Progress, load_state, save_state
@@ -77,7 +77,7 @@ class Trainer:
         store = DecisionStore(self.folder, network_config, in_memory=self._fits_memory())
         self.drawer = ExampleDrawer(store, config)
         self.held_out = HeldOut.of(self.split, self.drawer, batch=config.batch, ranks=ranks)
-        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=config.lr)
+        self.optimizer = torch.optim.Adam(rate_groups(self.network, config.mixing_rate))
         dtype = compute_dtype(config.precision, config.device)
         weight = config.decoding_weight
         self._objective = Objective(self.network, weight, dtype)
@@ -164,7 +164,7 @@ class Trainer:
             progress.step, schedule=config.schedule, warmup=config.warmup, num_steps=num_steps
         )
         for group in self.optimizer.param_groups:
-            group["lr"] = rate
+            group["lr"] = rate * group["factor"]
         terms: Terms = self._parallel(examples)
         self.optimizer.zero_grad()
         # The processes' gradients are averaged; this makes each decision count the same.

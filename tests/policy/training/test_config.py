@@ -12,6 +12,7 @@ from policy.training.config import AugmentationConfig
         ({"epochs": 0}, "epochs: got 0, expected at least 1."),
         ({"batch": 0}, "batch: got 0, expected at least 1."),
         ({"lr": 0.0}, "lr: got 0.0, expected above 0."),
+        ({"mixing_rate": -1.0}, "mixing_rate: got -1.0, expected above 0."),
         ({"val_share": 1.0}, "val_share: got 1.0, expected between 0 and 1."),
         ({"train_share": 0.0}, "train_share: got 0.0, expected above 0, at most 1."),
         ({"averaging": 1.0}, "averaging: got 1.0, expected 0 to below 1."),

@@ -10,6 +10,7 @@ from safetensors.torch import load_file
 
 from policy.errors import InvalidCheckpointError
 from policy.network.checkpoint import load_checkpoint
+from policy.network.mixing import mixing_weights
 from policy.network.model import SRNetwork
 from policy.training.config import TrainConfig
 from policy.training.distributed import Ranks
@@ -177,3 +178,22 @@ def test_validation_is_held_out_by_scene(make_train_config) -> None:
     trainer = Trainer(make_train_config(), ALONE, {})
     scenes = np.array(trainer.folder.scenes)
     assert not set(scenes[trainer.split.train]) & set(scenes[trainer.held_out.val.indices])
+
+
+@pytest.mark.parametrize("factor", [1.0, 20.0])
+def test_mixing_weights_learn_at_a_rate_of_their_own(
+    factor: float, make_train_config, plain
+) -> None:
+    """The first step of Adam is as long as the learning rate, wherever there is a gradient."""
+    config = make_train_config(lr=1e-3, warmup=0, mixing_rate=factor, clip=0.0, **plain)
+    before = dict(Trainer(config, ALONE, {}).network.named_parameters())
+    trainer, is_complete = train(config, num_steps=0)
+    assert not is_complete and trainer.progress.step == 1
+    mixing = mixing_weights(trainer.network)
+    assert {"language_alignment.similarity_sharpness", "evidence.prior_weight"} <= mixing.keys()
+    for name, parameter in trainer.network.named_parameters():
+        step = (parameter - before[name]).abs().max().item()
+        expected = 1e-3 * (factor if name in mixing else 1.0)
+        assert step <= expected * 1.01
+        if name in ("evidence.prior_weight", "decoder.query"):
+            assert step >= expected * 0.9
