@@ -1,4 +1,4 @@
-"""Weights that a few large things are mixed with, which have to learn faster than the others."""
+"""Weights that mix scores, which can learn at a rate of their own."""
 
 from torch import nn
 
@@ -6,9 +6,9 @@ from torch import nn
 class MixingModule(nn.Module):
     """A module whose own parameters, not those of its parts, weigh scores against each other.
 
-    They are of the size of a score, 1 to 10, while an entry of a projection is of the size of
-    0.1. Adam's steps are as large as the learning rate whatever the gradient: what suits a
-    projection hardly moves such a weight in a whole training.
+    They matter at the size of a score, 1 to 10, an entry of a projection at that of 0.1. Adam's
+    steps are as large as the learning rate whatever the gradient: what suits a projection hardly
+    moves such a weight in a whole training.
     """
 
 
@@ -19,7 +19,7 @@ def mixing_weights(network: nn.Module) -> dict[str, nn.Parameter]:
         network: Any network.
 
     Returns:
-        They by name, in the network's order.
+        Them by name, in the network's order.
     """
     return {
         f"{prefix}.{name}": parameter

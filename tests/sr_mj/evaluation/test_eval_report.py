@@ -1,5 +1,4 @@
 import csv
-import dataclasses
 import io
 import re
 from dataclasses import replace
@@ -263,7 +262,7 @@ def test_ours_stand_beside_what_was_published(tmp_path, dones, as_lines, make_do
         for seed in range(4)
     ]
     others = {
-        dataclasses.replace(done.episode, policy=label): done.record | {"policy": label}
+        replace(done.episode, policy=label): done.record | {"policy": label}
         for done in noisy
         for label in ("sr@relu", "sr@relu2")
     }
