@@ -17,23 +17,10 @@ from typing import Any
 from sr_mj.cli import run_command
 from sr_mj.evaluation.published import TABLE_1, TABLE_3, kind_of_policy
 from sr_mj.evaluation.results import Lines, read_lines
-from sr_mj.evaluation.statistics import Interval
 from sr_mj.evaluation.summary import Group, Score, by_group, by_policy, compare, score
-
-TASKS = ("grasp", "place", "pick-place")
-SPLITS = ("seen", "unseen")
-TITLES = {
-    "oracle": "`oracle` (reads ground truth)",
-    "sr-a": "`sr-a` (SR without DSSA)",
-    "base": "`base` (stage 2 only)",
-    "grounding": "`grounding` (no weights)",
-}
-ORDER = (
-    "sr", "sr-a", "base", "a2", "vlg",
-    "grounding", "clip-grounding", "lerf-togo", "think-grasp", "raw-image-grid", "raw-image", "vlp",
-    "random", "oracle",
-)  # fmt: skip
-"""Policies from top to bottom: trained, without weights, floor and ceiling."""
+from tools import condition_tables
+from tools.random_tables import random_table
+from tools.table_text import COLUMNS, ORDER, SPLITS, TASKS, markdown, percent, points, title
 
 Cells = dict[tuple[str, str], dict[str, Score]]
 """Scores by policy, for every task and kind of objects."""
@@ -46,33 +33,14 @@ class TablesConfig:
     results: tuple[Path, ...] = (
         Path("docs/results/arrangements"),
         Path("docs/results/first-grasps"),
+        Path("docs/results/held-out-cluttered15"),
+        Path("docs/results/held-out-place8"),
     )
     """Folders of results that are counted together."""
     documents: tuple[Path, ...] = (Path("README.md"), Path("docs/results.md"))
     """Documents to fill in."""
     check: bool = False
     """Write nothing; exit with status 1 if a table differs."""
-
-
-def percent(interval: Interval) -> str:
-    """Write a rate with its interval, such as "97.3 [95, 99]"."""
-    rate = "100" if interval.value == 1 else f"{interval.value * 100:.1f}"
-    return f"{rate} [{interval.low * 100:.0f}, {interval.high * 100:.0f}]"
-
-
-def points(interval: Interval | None) -> str:
-    """Write the ends of a difference's interval, in percentage points."""
-    if interval is None:
-        return "[]"
-    low, high = (round(end * 100) for end in (interval.low, interval.high))
-    return f"[{low}, {high}]"
-
-
-def markdown(heading: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """Write a table."""
-    heading = list(heading)
-    lines = [heading, ["---"] * len(heading), *rows]
-    return "\n".join("|" + "|".join(f" {c} " if c else " " for c in cells) + "|" for cells in lines)
 
 
 def clean_scores(lines: Lines) -> Cells:
@@ -90,15 +58,13 @@ def clean_scores(lines: Lines) -> Cells:
 def overview(lines: Lines) -> str:
     """Return success of all policies in all tasks; with steps where several attempts are made."""
     cells = clean_scores(lines)
-    labels = [
-        label for label in ORDER if all(label in cells.get((t, s), {}) for t, s in _columns())
-    ]
-    heading = ["policy", *(f"{task}, {split}" for task, split in _columns())]
+    labels = [label for label in ORDER if all(label in cells.get((t, s), {}) for t, s in COLUMNS)]
+    heading = ["policy", *(f"{task}, {split}" for task, split in COLUMNS)]
     rows = [
-        [_title(label), *(_with_steps(cells[key][label], key[0]) for key in _columns())]
+        [title(label), *(_with_steps(cells[key][label], key[0]) for key in COLUMNS)]
         for label in labels
     ]
-    paper = [_published(task, "sr", split) for task, split in _columns()]
+    paper = [_published(task, "sr", split) for task, split in COLUMNS]
     rows.append(["*SR in the paper: other features, objects, simulator*", *paper])
     return markdown(heading, rows)
 
@@ -117,7 +83,7 @@ def task_table(task: str) -> Callable[[Lines], str]:
             heading += [split, *(["steps"] if has_steps else []), "paper"]
         rows = []
         for label in present:
-            row = [_title(label)]
+            row = [title(label)]
             for split in SPLITS:
                 found = cells.get((task, split), {}).get(label)
                 row.append(percent(found.success) if found else "")
@@ -138,7 +104,7 @@ def first_grasps(lines: Lines) -> str:
     for label in (label for label in ORDER if label in found):
         s = score(label, [record for record in found[label] if record["scene"] in scenes])
         paper = _published("grasp", label, "seen").replace(", ", " / ").strip("*")
-        rows.append([_title(label), percent(s.success), f"{s.steps:.2f}", paper])
+        rows.append([title(label), percent(s.success), f"{s.steps:.2f}", paper])
     return markdown(["policy", f"{len(scenes)} seen arrangements", "steps", "paper"], rows)
 
 
@@ -156,10 +122,9 @@ def differences(lines: Lines) -> str:
     labels = [label for label in ORDER if any(label in found for found in cells.values())]
     labels = [label for label in labels if label not in ("sr", "random", "oracle")]
     rows = [
-        [f"`{label}`", *(cells.get(key, {}).get(label, "") for key in _columns())]
-        for label in labels
+        [f"`{label}`", *(cells.get(key, {}).get(label, "") for key in COLUMNS)] for label in labels
     ]
-    return markdown(["", *(f"{task}, {split}" for task, split in _columns())], rows)
+    return markdown(["", *(f"{task}, {split}" for task, split in COLUMNS)], rows)
 
 
 BLOCKS: dict[str, Callable[[Lines], str]] = {
@@ -167,6 +132,12 @@ BLOCKS: dict[str, Callable[[Lines], str]] = {
     **{task: task_table(task) for task in TASKS},
     "first-grasps": first_grasps,
     "differences": differences,
+    "random-cluttered15": random_table("cluttered15", "seen"),
+    "random-place8": random_table("place8", "seen"),
+    "noise": condition_tables.noise,
+    "perturbation": condition_tables.perturbation,
+    "heavy30": condition_tables.heavy30,
+    "paraphrase": condition_tables.paraphrase,
 }
 
 
@@ -204,14 +175,6 @@ def _clean(lines: Lines) -> dict[Group, dict[str, list[dict[str, Any]]]]:
         for group, records in by_group(lines).items()
         if group.condition == "clean" and group.task in TASKS
     }
-
-
-def _columns() -> list[tuple[str, str]]:
-    return [(task, split) for task in TASKS for split in SPLITS]
-
-
-def _title(label: str) -> str:
-    return TITLES.get(label, f"`{label}`")
 
 
 def _with_steps(found: Score, task: str) -> str:
