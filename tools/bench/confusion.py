@@ -145,7 +145,7 @@ def main(config: ConfusionConfig) -> int:
     counts = {kind: len(found[config.policies[0], kind]) for kind in kinds}
     rows = []
     for name in config.policies:
-        shares = [np.mean(found[name, kind], axis=0) * 100 for kind in kinds]
+        shares = [np.array(found[name, kind]).mean(axis=0) * 100 for kind in kinds]
         rows.append([f"`{name}`", *(f"{plain:.0f} -> {other:.0f} %" for plain, other in shares)])
     print(markdown(["policy", *(f"{kind}, {counts[kind]}" for kind in kinds)], rows))
     return 0
