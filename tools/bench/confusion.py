@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from perception.encoders import load_encoder
 from policy.base import Policy
 from policy.demonstrations import DemonstrationFolder
 from policy.demonstrations.decision import Demonstration
@@ -48,6 +49,13 @@ class ConfusionConfig:
     """Most decisions, drawn from all; 0 for all."""
     threads: int = 1
     """Threads of torch."""
+
+    def __post_init__(self) -> None:
+        """Check what would otherwise end in an empty table."""
+        if not self.policies:
+            raise InvalidConfigError("policies: got none, expected at least one name.")
+        if self.limit < 0:
+            raise InvalidConfigError(f"limit: got {self.limit}, expected 0 for all, or more.")
 
 
 def confuse(observation: Observation, other: Observation) -> Observation:
@@ -91,6 +99,19 @@ def kind_of(demonstration: Demonstration) -> str:
     return decision.side or ("clear" if decision.clears else "pick")
 
 
+def stand_ins(fingerprint: str) -> tuple[str, ...]:
+    """Return the fingerprints of the same encoder in every arithmetic, if it is the embedded one.
+
+    Args:
+        fingerprint: Encoder of the demonstrations.
+
+    Returns:
+        What the weights of a policy may have been trained with.
+    """
+    embedded = load_encoder("embedded").fingerprints
+    return embedded if fingerprint in embedded else (fingerprint,)
+
+
 def measure(
     folder: DemonstrationFolder, indices: np.ndarray, policies: dict[str, Policy]
 ) -> dict[tuple[str, str], list[tuple[bool, bool]]]:
@@ -131,10 +152,10 @@ def main(config: ConfusionConfig) -> int:
     indices = split.new if config.new_share else split.val
     if 0 < config.limit < len(indices):
         indices = np.sort(np.random.default_rng(0).permutation(indices)[: config.limit])
-    policies = {}
+    policies, encoder = {}, stand_ins(folder.encoder)
     for text in config.policies:
         name, _, checkpoint = text.partition("@")
-        policies[text] = load_policy(name, checkpoint=checkpoint or None, encoder=folder.encoder)
+        policies[text] = load_policy(name, checkpoint=checkpoint or None, encoder=encoder)
     found = measure(folder, indices, policies)
     if not found:
         raise InvalidConfigError(
