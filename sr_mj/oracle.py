@@ -12,13 +12,15 @@ from sr_mj.judge import object_in_gripper
 from sr_mj.oracle_drop import rule_out_falls
 from sr_mj.oracle_place import score_places
 from sr_mj.scene import Scene, SceneObject
-from sr_mj.scene.placement import find_object
+from sr_mj.scene.placement import find_object, objects_on
 
 _ON_TARGET = 10.0
 _SIDE_MARGIN_M = 0.004
 _MIN_POINTS = 3
 # Two things gripped at once are both carried off, and what is put down is not alone.
 _SHARED = -1.0
+# What lies on a target comes along, and is put down with it: it is taken away first.
+_LOADED, _UNLOADS = -3.0, 8.5
 # An object that is held beside its centre of mass turns between the fingers on the way; at this
 # distance that costs as much as half of the prior.
 _LEVER_SCALE_M, _LEVER = 0.06, -0.5
@@ -35,7 +37,8 @@ class OraclePolicy:
 
     Picking, a candidate that would close on an object of the target set beats every other; among
     those, the geometric prior decides, less for what would be gripped along with it and, where it
-    is to be placed, for its weight beside the fingers. If there is none, the candidate nearest to
+    is to be placed, for its weight beside the fingers; there, what lies on a target is taken away
+    before it. If there is none, the candidate nearest to
     a target wins: it most likely removes what lies on it or beside it. Placing, the place deepest
     inside the region wins at which the object, let fall in a copy of the scene, stays; see
     `score_places`. Privileged: it reads object poses and the goal's objects, which no real robot
@@ -64,8 +67,9 @@ class OraclePolicy:
 
         Returns:
             Logits. Of grasps: 10 + prior on a target, less 1 where another object is between the
-            fingers too, and less up to 0.5 for a lever if it is to be placed; otherwise
-            prior - distance to the nearest target in decimetres. Of places: see `score_places`.
+            fingers too; if it is to be placed, less up to 0.5 for a lever, and less 3 where
+            something lies on it, on which a grasp gets 8.5 + prior; otherwise prior - distance to
+            the nearest target in decimetres. Of places: see `score_places`.
         """
         if candidates.kind == "place":
             moved = object_in_gripper(self._scene)
@@ -85,6 +89,9 @@ class OraclePolicy:
             # What is not gripped has no lever; any name will do there.
             held = np.where(on_target, gripped, targets[0])
             gain = gain + _LEVER * self._levers(held, candidates)
+            on_loaded, on_load = self._loads(gripped)
+            gain = np.where(on_load & ~on_target, _UNLOADS, gain + _LOADED * on_loaded)
+            on_target |= on_load
         distance = self.distances(targets, candidates.positions)
         bonus = np.where(on_target, gain, -10 * distance)
         return ActionScores(logits=(candidates.prior + bonus).astype(np.float32))
@@ -129,6 +136,20 @@ class OraclePolicy:
         # The torque of the weight about the axis through both pads, over the weight.
         lever = np.abs(closing[:, 0] * offset[:, 1] - closing[:, 1] * offset[:, 0])
         return (lever / _LEVER_SCALE_M).clip(0, 1)
+
+    def _loads(self, gripped: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tell which grasps are on targets that carry something, and which on what they carry.
+
+        What the target is to be put by must stay.
+        """
+        goal = self._scene.goal
+        kept = () if goal.place is None else goal.place.references
+        carried = {
+            target: set(objects_on(self._scene, target)).difference(kept) for target in goal.targets
+        }
+        loads = set[str]().union(*carried.values())
+        loaded = [target for target, load in carried.items() if load]
+        return np.isin(gripped, loaded), np.isin(gripped, sorted(loads))
 
     def _world_points(self, name: str) -> np.ndarray:
         pose = self._scene.T_world_object(name)

@@ -20,6 +20,8 @@ RING_M = (0.05, 0.15)
 _CORE_SHARE = 1 / 3
 _CLOSE_M = 1e-4
 _WORLD = 0  # the body that the table belongs to
+# Least vertical part of a contact's normal at which one thing lies on the other; less leans.
+_LIES_ON = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -183,12 +185,35 @@ def touched_bodies(scene: Scene, name: str) -> set[int]:
     Returns:
         Body ids.
     """
+    return {int(other) for other in _contacts(scene, name)[0]}
+
+
+def objects_on(scene: Scene, name: str) -> tuple[str, ...]:
+    """Name the objects that lie on another, which would come along if that were lifted.
+
+    Args:
+        scene: The scene.
+        name: One of its objects.
+
+    Returns:
+        Names of those that touch it from above.
+    """
+    bodies, upward = _contacts(scene, name)
+    above = {int(body) for body in bodies[upward > _LIES_ON]}
+    return tuple(item.name for item in scene.objects if item.body.body_id in above)
+
+
+def _contacts(scene: Scene, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return what touches an object, by body (C,), and how far up (C,) it is touched, -1 to 1."""
     body = find_object(scene, name).body.body_id
     data = _everything_awake(scene)
-    touching = data.contact.dist[: data.ncon] < _CLOSE_M
-    pairs = scene.model.geom_bodyid[data.contact.geom[: data.ncon][touching]]
-    mine = pairs[np.any(pairs == body, axis=1)]
-    return {int(other) for other in mine.ravel()} - {body}
+    contact, num = data.contact, data.ncon
+    pairs = scene.model.geom_bodyid[contact.geom[:num]]
+    mine = (contact.dist[:num] < _CLOSE_M) & np.any(pairs == body, axis=1)
+    is_first = pairs[mine, 0] == body
+    # The normal points from the first of a pair to the second.
+    upward = np.where(is_first, 1, -1) * contact.frame[:num][mine, 2]
+    return np.where(is_first, pairs[mine, 1], pairs[mine, 0]), upward
 
 
 def _everything_awake(scene: Scene) -> mujoco.MjData:

@@ -11,6 +11,7 @@ from sr_mj.scene.placement import (
     find_object,
     footprint,
     is_placed,
+    objects_on,
     place_region,
     touched_bodies,
 )
@@ -88,6 +89,8 @@ def test_in_a_bowl(scene):
     (center,) = region.sample(np.random.default_rng(1), 1)
     put(scene, "lemon", center, 0.05)
     assert touched_bodies(scene, "lemon") == {find_object(scene, "red_bowl").body.body_id}
+    assert objects_on(scene, "red_bowl") == ("lemon",)
+    assert objects_on(scene, "lemon") == ()
     assert is_placed(scene, "lemon", region)
 
 
