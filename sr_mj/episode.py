@@ -130,9 +130,7 @@ def hand_over(
     """
     rngs, attempts, describe_held = EpisodeRngs.from_seed(seed), [], None
     if is_handed_over(scene):
-        picking = replace(
-            pipeline, policy=OraclePolicy(scene), perturbation=None, keep_unreachable=False
-        )
+        picking = pipeline.handing_over(OraclePolicy(scene))
         for attempt in _pick(scene, picking, rngs, max_attempts):
             attempts.append(replace(attempt, is_hand_over=True))
             if attempt.outcome.success:
@@ -282,7 +280,10 @@ def _act(
     if plan is None:
         reason = Reason.UNREACHABLE if len(proposed) else Reason.NO_CANDIDATES
         return Outcome(success=False, reason=reason)
-    return pipeline.executor.execute(plan, keep_target=scene.goal.place is not None)
+    is_kept = scene.goal.place is not None
+    return pipeline.executor.execute(
+        plan, keep_target=is_kept, shake_off=is_kept and pipeline.shakes_off
+    )
 
 
 def _held_after(attempt: Attempt, pipeline: Pipeline) -> DescribeHeld:

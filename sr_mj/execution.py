@@ -31,7 +31,8 @@ class ExecutionConfig:
         release_speed: Speed of the opening where something is put down, m/s.
         part_s: Wait after that, before the fingers leave.
         min_rise_m: How far an object must have risen to count as lifted.
-        max_slip_m: How far a held object may move in the gripper between lift and carry's end.
+        max_slip_m: How far a held object may move in the gripper between the end of the lift and
+            that of the carry, and of the tilt.
         settle_limit_s: Longest wait, after placing, until everything lies still.
         calm_for_s: How long it must lie still.
     """
@@ -80,7 +81,7 @@ class Executor:
         self._scene = scene
         self.T_world_grasp: np.ndarray | None = None
 
-    def execute(self, plan: Plan, *, keep_target: bool = False) -> Outcome:
+    def execute(self, plan: Plan, *, keep_target: bool = False, shake_off: bool = False) -> Outcome:
         """Execute a plan to its end, and judge it by the objects' motion.
 
         A real robot feels an empty or lost grasp by its fingers; so does this one, and then
@@ -90,6 +91,8 @@ class Executor:
             plan: What to do.
             keep_target: Whether a target that was picked stays in the closed gripper over the bin,
                 for a plan to place it; anything else is dropped into the bin.
+            shake_off: Whether what was picked is tilted over the bin and back, so that only what is
+                between the fingers stays.
 
         Returns:
             The outcome.
@@ -98,6 +101,8 @@ class Executor:
         judge = Judge(self._scene)
         segments = {segment.phase: segment for segment in plan.segments}
         if plan.kind == "pick":
+            if not shake_off:
+                segments.pop(Phase.TILT, None)
             outcome = self._pick(plan, segments, judge, keep_target)
         else:
             outcome = self._place(plan, segments, judge)
@@ -133,7 +138,7 @@ class Executor:
     def _grasp(
         self, segments: dict[Phase, Segment], judge: Judge
     ) -> tuple[Reason, str | None, bool]:
-        """Reach, close, lift and carry; a grasp that is felt to be empty ends at home.
+        """Reach, close, lift, carry, tilt; a grasp that is felt to be empty ends at home.
 
         Returns:
             How it ended, what was lifted, and whether the fingers felt something to the end.
@@ -152,6 +157,8 @@ class Executor:
         held = judge.lifted_object(self.config.min_rise_m)
         grip = np.zeros(3) if held is None else judge.position_in_tool(held)
         self._move(segments[Phase.CARRY])
+        if self.drive.feels_object and Phase.TILT in segments:
+            self._move(segments[Phase.TILT])
         if not self.drive.feels_object:
             self._move(segments[Phase.RETURN])
             return (Reason.SLIPPED_LIFT if held is None else Reason.SLIPPED_CARRY), held, False

@@ -1,6 +1,6 @@
 """The stages of the system, put together."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,8 @@ class Pipeline:
         keep_unreachable: Leave candidates that the arm cannot reach to the policy, as the paper
             does; if it chooses one, the attempt is lost. Otherwise they are left out, and if the
             first choice cannot be executed after all, the next one is tried.
+        shakes_off: Whether what is to be placed is tilted over the bin first, since what lies on it
+            would be put down with it.
     """
 
     rig: CameraRig
@@ -53,6 +55,13 @@ class Pipeline:
     robot: RobotBody
     perturbation: PosePerturbation | None = None
     keep_unreachable: bool = False
+    shakes_off: bool = True
+
+    def handing_over(self, policy: Policy) -> "Pipeline":
+        """Return the stages with which a policy picks what others then place: nothing errs."""
+        return replace(
+            self, policy=policy, perturbation=None, keep_unreachable=False, shakes_off=False
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

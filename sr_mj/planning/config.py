@@ -38,6 +38,8 @@ class PlannerConfig:
             free, and always when there is no cloud to check the direct way against.
         lift_m: How far a grasped object is lifted straight up.
         carry_height_m: Height of the tool over the bin.
+        tilt_rad: How far what is to be placed is tilted over the bin, rad. What lies on it slides
+            off: objects have friction 0.7, which holds up to 0.61 rad.
         step_m: Distance between waypoints of a straight path.
         max_joint_step: Largest joint motion between these waypoints, rad; more means that the
             arm would flip from one IK branch to another.
@@ -60,6 +62,7 @@ class PlannerConfig:
     transit_height_m: float = 0.28
     lift_m: float = 0.20
     carry_height_m: float = 0.32
+    tilt_rad: float = 1.05
     step_m: float = 0.01
     max_joint_step: float = 0.35
     check_step_rad: float = 0.05

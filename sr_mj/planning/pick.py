@@ -1,4 +1,4 @@
-"""Plans one pick: home, pre-grasp, grasp along the approach, lift, carry to the bin, home."""
+"""Plans one pick: home, pre-grasp, grasp along the approach, lift, bin, a tilt there, home."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from sr_mj.planning.motion import FreePath
 from sr_mj.planning.plan import Phase
 from sr_mj.planning.straight import moved, solve_ways, straight_poses
 from sr_mj.planning.task import Draft, DraftBuilder, PlanningTask, first_draft
+from sr_mj.planning.tilt import plan_tilt
 
 _UP = np.array([0.0, 0.0, 1.0])
 # The gripper looks the same turned by half a turn about its approach direction.
@@ -104,6 +105,9 @@ def _join(task: PlanningTask, reach: _Reach, opening_m: float, may_search: bool)
     build.set_width(Phase.CLOSE, 0.0)
     build.move(Phase.LIFT, reach.lift, config.approach_speed, 0.0)
     build.move(Phase.CARRY, carry, config.carry_speed, 0.0)
+    tilt = plan_tilt(task, carry.waypoints[-1])
+    if tilt is not None:
+        build.move(Phase.TILT, tilt, config.carry_speed, 0.0)
     build.set_width(Phase.RELEASE, ROBOTIQ_2F85_CLASS.max_width_m)
     build.move(Phase.RETURN, home, 1.0, 0.0)
     return build.finish()

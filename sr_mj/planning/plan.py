@@ -12,8 +12,9 @@ from sr_mj.trajectory import Trajectory
 class Phase(StrEnum):
     """What the arm does in a segment of a plan.
 
-    A pick is transit, approach, close, lift, carry, release, return; a placement is transit,
-    lower, release, retreat, return.
+    A pick is transit, approach, close, lift, carry, tilt, release, return; a placement is transit,
+    lower, release, retreat, return. The tilt is left out of picks that bring the arm over the bin
+    in a posture in which it cannot.
     """
 
     TRANSIT = "transit"
@@ -21,6 +22,7 @@ class Phase(StrEnum):
     CLOSE = "close"
     LIFT = "lift"
     CARRY = "carry"
+    TILT = "tilt"
     LOWER = "lower"
     RELEASE = "release"
     RETREAT = "retreat"
@@ -28,7 +30,7 @@ class Phase(StrEnum):
 
 
 PICK_PHASES = (
-    Phase.TRANSIT, Phase.APPROACH, Phase.CLOSE, Phase.LIFT, Phase.CARRY, Phase.RELEASE,
+    Phase.TRANSIT, Phase.APPROACH, Phase.CLOSE, Phase.LIFT, Phase.CARRY, Phase.TILT, Phase.RELEASE,
     Phase.RETURN,
 )  # fmt: skip
 PLACE_PHASES = (Phase.TRANSIT, Phase.LOWER, Phase.RELEASE, Phase.RETREAT, Phase.RETURN)

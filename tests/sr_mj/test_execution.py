@@ -12,7 +12,7 @@ from sr_mj.judge import object_in_gripper
 from sr_mj.outcome import Reason
 from sr_mj.planning import Phase, Planner
 from sr_mj.scene import Goal, PlaceGoal, SceneConfig, make_scene
-from sr_mj.scene.placement import find_object, place_region
+from sr_mj.scene.placement import find_object, place_region, touched_bodies
 
 
 @pytest.fixture(scope="module")
@@ -323,3 +323,23 @@ def test_what_falls_off_the_table_meanwhile_is_counted(plan_at):
     outcome = Executor(scene, on_step=push).execute(plan_at((*away, 0.06)))
     assert outcome.reason is Reason.KNOCKED_OFF
     assert outcome.knocked_off == (item.name,) and not outcome.success
+
+
+@pytest.mark.parametrize("shake_off", [False, True])
+def test_what_lies_on_something_slides_off_into_the_bin(plan_at, shake_off):
+    """A bottle of shampoo lies on the calculator, and would be put down with it."""
+    scene = make_scene(SceneConfig(arrangement="pick-place-unseen-00"))
+    executor = Executor(scene)
+    plan = plan_at([0.5017, -0.2293, 0.0208], np.radians(30), 0.073)
+    outcome = executor.execute(plan, keep_target=True, shake_off=shake_off)
+    assert outcome.reason is Reason.GRASPED_TARGET and outcome.grasped == "calculator"
+    assert not outcome.knocked_off
+    assert object_in_gripper(scene) == "calculator"
+    executor.drive.hold(1.0)
+    shampoo = scene.data.xipos[find_object(scene, "shampoo").body.body_id]
+    assert np.abs(shampoo[:2] - BIN_CENTER[:2]).max() < BIN_HALF_M
+    assert (shampoo[2] < 0.1) == shake_off
+    assert (
+        touched_bodies(scene, "calculator").isdisjoint({find_object(scene, "shampoo").body.body_id})
+        == shake_off
+    )

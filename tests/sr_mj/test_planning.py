@@ -6,7 +6,7 @@ import pytest
 from models.tabletop import BIN_CENTER
 from models.ur5 import HOME_QPOS
 from policy.actions import ActionCandidates
-from sr_mj.planning import PICK_PHASES, Phase, Planner, straight_poses
+from sr_mj.planning import PICK_PHASES, Phase, Planner, PlannerConfig, straight_poses
 from sr_mj.planning.body import GripperBody, RobotBody
 from sr_mj.planning.obstacles import find_obstacles
 
@@ -108,6 +108,24 @@ def test_releases_over_the_bin(planner, near):
     carry = by_phase(planner.plan(candidates(near), FIRST))[Phase.CARRY]
     position = planner.kinematics.tool_pose(carry.end)[:3, 3]
     np.testing.assert_allclose(position[:2], BIN_CENTER[:2], atol=1e-3)
+
+
+def test_tilts_on_the_spot_about_the_line_through_both_pads(planner, near):
+    tilt = by_phase(planner.plan(candidates(near), FIRST))[Phase.TILT]
+    np.testing.assert_allclose(tilt.end, tilt.start, atol=1e-12)
+    path = tilt.path(np.linspace(0, 1, 101))
+    poses = np.array([planner.kinematics.tool_pose(posture) for posture in path])
+    np.testing.assert_allclose(poses[:, :3, 3], np.tile(poses[0, :3, 3], (101, 1)), atol=2e-3)
+    np.testing.assert_allclose(poses[:, :3, 0], np.tile(poses[0, :3, 0], (101, 1)), atol=5e-3)
+    assert np.arccos(-poses[:, 2, 2]).max() == pytest.approx(planner.config.tilt_rad, abs=5e-3)
+    assert (planner._body.is_free(path)).all()
+
+
+def test_a_tilt_that_the_arm_cannot_reach_is_left_out(near):
+    config = PlannerConfig(tilt_rad=2.5)
+    plan = Planner(config).plan(candidates(near), FIRST)
+    phases = tuple(phase for phase in PICK_PHASES if phase is not Phase.TILT)
+    assert tuple(segment.phase for segment in plan.segments) == phases
 
 
 def test_every_motion_keeps_the_limits(planner, near):
