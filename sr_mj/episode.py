@@ -6,6 +6,7 @@ This is the one way through the system; command lines and evaluation only start 
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -228,7 +229,8 @@ def _attempt(
         with watch.measure("plan"):
             order = np.argsort(-scores.logits, kind="stable")
             cloud = percept.geometry
-            plan = _plan(pipeline, rngs, candidates, order, cloud, situation.held)
+            is_kept = scene.goal.place is not None
+            plan = _plan(pipeline, rngs, candidates, order, cloud, situation.held, is_kept=is_kept)
         with watch.measure("act"):
             outcome = _act(scene, pipeline, proposed, plan)
     return Attempt(
@@ -253,11 +255,15 @@ def _plan(
     order: np.ndarray,
     cloud: GeometryCloud,
     held: HeldObject | None,
+    *,
+    is_kept: bool,
 ) -> Plan | None:
     # With unreachable candidates among them, the policy's choice is final.
     order = order[:1] if pipeline.keep_unreachable else order
     start = None if held is None else pipeline.executor.drive.arm_qpos
-    plan = pipeline.planner.plan(candidates, order, obstacles=cloud.points, held=held, start=start)
+    shake_off = is_kept and pipeline.shakes_off
+    make = partial(pipeline.planner.plan, held=held, start=start, shake_off=shake_off)
+    plan = make(candidates, order, obstacles=cloud.points)
     if plan is None or pipeline.perturbation is None:
         return plan
     # An error is nothing that a planner knows: it does not change the choice, and where the erring
@@ -266,9 +272,7 @@ def _plan(
         candidates.take(np.array([plan.chosen])), rngs.perturbation
     )
     for obstacles in (cloud.points, None):
-        erred = pipeline.planner.plan(
-            erring, np.array([0]), obstacles=obstacles, held=held, start=start
-        )
+        erred = make(erring, np.array([0]), obstacles=obstacles)
         if erred is not None:
             return replace(erred, chosen=plan.chosen)
     return None
@@ -280,10 +284,7 @@ def _act(
     if plan is None:
         reason = Reason.UNREACHABLE if len(proposed) else Reason.NO_CANDIDATES
         return Outcome(success=False, reason=reason)
-    is_kept = scene.goal.place is not None
-    return pipeline.executor.execute(
-        plan, keep_target=is_kept, shake_off=is_kept and pipeline.shakes_off
-    )
+    return pipeline.executor.execute(plan, keep_target=scene.goal.place is not None)
 
 
 def _held_after(attempt: Attempt, pipeline: Pipeline) -> DescribeHeld:

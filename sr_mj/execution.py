@@ -81,7 +81,7 @@ class Executor:
         self._scene = scene
         self.T_world_grasp: np.ndarray | None = None
 
-    def execute(self, plan: Plan, *, keep_target: bool = False, shake_off: bool = False) -> Outcome:
+    def execute(self, plan: Plan, *, keep_target: bool = False) -> Outcome:
         """Execute a plan to its end, and judge it by the objects' motion.
 
         A real robot feels an empty or lost grasp by its fingers; so does this one, and then
@@ -91,8 +91,6 @@ class Executor:
             plan: What to do.
             keep_target: Whether a target that was picked stays in the closed gripper over the bin,
                 for a plan to place it; anything else is dropped into the bin.
-            shake_off: Whether what was picked is tilted over the bin and back, so that only what is
-                between the fingers stays.
 
         Returns:
             The outcome.
@@ -101,8 +99,6 @@ class Executor:
         judge = Judge(self._scene)
         segments = {segment.phase: segment for segment in plan.segments}
         if plan.kind == "pick":
-            if not shake_off:
-                segments.pop(Phase.TILT, None)
             outcome = self._pick(plan, segments, judge, keep_target)
         else:
             outcome = self._place(plan, segments, judge)

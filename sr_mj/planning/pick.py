@@ -31,13 +31,16 @@ class _Reach:
     above: list[np.ndarray]
 
 
-def plan_pick(task: PlanningTask, T_world_tool: np.ndarray, width_m: float) -> Draft | None:
+def plan_pick(
+    task: PlanningTask, T_world_tool: np.ndarray, width_m: float, *, shake_off: bool = False
+) -> Draft | None:
     """Plan a pick.
 
     Args:
         task: Robot and surroundings.
         T_world_tool: (4, 4) grasp pose.
         width_m: Contact width, metres.
+        shake_off: Whether to tilt what is held over the bin.
 
     Returns:
         The draft, or None if the grasp can't be reached, or not be left, without collision.
@@ -50,7 +53,7 @@ def plan_pick(task: PlanningTask, T_world_tool: np.ndarray, width_m: float) -> D
         return None
     return first_draft(
         _reaches(task, T_world_tool, back),
-        lambda reach, may_search: _join(task, reach, opening_m, may_search),
+        lambda reach, may_search: _join(task, reach, opening_m, shake_off, may_search),
     )
 
 
@@ -81,7 +84,9 @@ def _above(task: PlanningTask, pre_grasp: np.ndarray, posture: np.ndarray) -> li
     return list(options[gaps < _LARGEST_RISE_RAD][:1])
 
 
-def _join(task: PlanningTask, reach: _Reach, opening_m: float, may_search: bool) -> Draft | None:
+def _join(
+    task: PlanningTask, reach: _Reach, opening_m: float, shake_off: bool, may_search: bool
+) -> Draft | None:
     """Join the straight ways of a reach by free motions."""
     config = task.config
     transit = task.motions.connect(
@@ -105,7 +110,7 @@ def _join(task: PlanningTask, reach: _Reach, opening_m: float, may_search: bool)
     build.set_width(Phase.CLOSE, 0.0)
     build.move(Phase.LIFT, reach.lift, config.approach_speed, 0.0)
     build.move(Phase.CARRY, carry, config.carry_speed, 0.0)
-    tilt = plan_tilt(task, carry.waypoints[-1])
+    tilt = plan_tilt(task, carry.waypoints[-1]) if shake_off else None
     if tilt is not None:
         build.move(Phase.TILT, tilt, config.carry_speed, 0.0)
     build.set_width(Phase.RELEASE, ROBOTIQ_2F85_CLASS.max_width_m)

@@ -13,8 +13,8 @@ class Phase(StrEnum):
     """What the arm does in a segment of a plan.
 
     A pick is transit, approach, close, lift, carry, tilt, release, return; a placement is transit,
-    lower, release, retreat, return. The tilt is left out of picks that bring the arm over the bin
-    in a posture in which it cannot.
+    lower, release, retreat, return. The tilt is there only if it is asked for, and if the arm can
+    in the posture in which it comes to be over the bin.
     """
 
     TRANSIT = "transit"

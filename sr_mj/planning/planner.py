@@ -78,6 +78,7 @@ class Planner:
         obstacles: np.ndarray | None = None,
         held: "HeldObject | None" = None,
         start: np.ndarray | None = None,
+        shake_off: bool = False,
     ) -> Plan | None:
         """Plan the first candidate, in a given order, that can be executed.
 
@@ -88,6 +89,8 @@ class Planner:
                 arm goes high over whatever may stand on the table.
             held: The object to place.
             start: (6,) posture of the arm, rad; home when None.
+            shake_off: Whether a pick tilts what it holds over the bin, so that only what is between
+                the fingers stays.
 
         Returns:
             The plan, or None if none of the first `num_tried` candidates can be reached without
@@ -108,7 +111,7 @@ class Planner:
         for index in order[is_reachable]:
             pose, width_m = candidates.Ts_world_tool[index], float(candidates.width_m[index])
             if candidates.kind == "pick":
-                drafted = plan_pick(task, pose, width_m)
+                drafted = plan_pick(task, pose, width_m, shake_off=shake_off)
             else:
                 drafted = plan_place(task, pose, width_m, held)
             if drafted is not None:

@@ -29,14 +29,14 @@ def banana_scene():
 def plan_at(planner, pose_down):
     """Plans to grasp at a position, straight from above."""
 
-    def make(position, yaw=0.0, width_m=0.05):
+    def make(position, yaw=0.0, width_m=0.05, shake_off=False):
         candidates = ActionCandidates(
             kind="pick",
             Ts_world_tool=pose_down(*position, yaw)[None],
             width_m=np.array([width_m], np.float32),
             prior=np.ones(1, np.float32),
         )
-        plan = planner.plan(candidates, np.array([0]))
+        plan = planner.plan(candidates, np.array([0]), shake_off=shake_off)
         assert plan is not None
         return plan
 
@@ -330,8 +330,8 @@ def test_what_lies_on_something_slides_off_into_the_bin(plan_at, shake_off):
     """A bottle of shampoo lies on the calculator, and would be put down with it."""
     scene = make_scene(SceneConfig(arrangement="pick-place-unseen-00"))
     executor = Executor(scene)
-    plan = plan_at([0.5017, -0.2293, 0.0208], np.radians(30), 0.073)
-    outcome = executor.execute(plan, keep_target=True, shake_off=shake_off)
+    plan = plan_at([0.5017, -0.2293, 0.0208], np.radians(30), 0.073, shake_off)
+    outcome = executor.execute(plan, keep_target=True)
     assert outcome.reason is Reason.GRASPED_TARGET and outcome.grasped == "calculator"
     assert not outcome.knocked_off
     assert object_in_gripper(scene) == "calculator"

@@ -64,7 +64,7 @@ class Tally:
         searched: Phases for which the sampling planner was needed.
         plan_s: CPU time of every decision.
         verdict_s: CPU time of every verdict on all candidates.
-        motion_s: Simulated time that the arm moves in every plan, without the tilt.
+        motion_s: Simulated time that the arm moves in every plan.
         reachable: Share of candidates with a good verdict, a decision.
     """
 
@@ -98,9 +98,7 @@ class Tally:
             self.planned += 1
             self.best += plan.chosen == best_first[0]
             self.searched.update(plan.searched)
-            # A mere pick leaves the tilt out.
-            parts = (segment for segment in plan.segments if segment.phase is not Phase.TILT)
-            moves = (segment.trajectory for segment in parts)
+            moves = (segment.trajectory for segment in plan.segments)
             self.motion_s.append(sum(move.duration_s for move in moves if move is not None))
         return plan
 
