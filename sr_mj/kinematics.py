@@ -64,8 +64,8 @@ def build_planning_model() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
 
 
-def _solid_geoms(model: mujoco.MjModel) -> tuple[list[int], list[int]]:
-    """Geoms of the robot that can collide, and those of table and bin."""
+def solid_geoms(model: mujoco.MjModel) -> tuple[list[int], list[int]]:
+    """List the geoms of the robot that can collide, and those of table and bin."""
     names = [model.geom(geom).name for geom in range(model.ngeom)]
     robot = np.flatnonzero((model.geom_bodyid > model.body("bin").id) & (model.geom_contype > 0))
     fixed = [i for i, name in enumerate(names) if name == TABLE_GEOM or name.startswith("bin_")]
@@ -88,7 +88,7 @@ class ArmKinematics:
             TOOL_SITE, "site", position_cost=1.0, orientation_cost=0.3, lm_damping=1e-6
         )
         self._posture_task = mink.PostureTask(self._model, cost=self.config.posture_cost)
-        robot, fixed = _solid_geoms(self._model)
+        robot, fixed = solid_geoms(self._model)
         self._limits = [
             mink.ConfigurationLimit(self._model),
             mink.VelocityLimit(self._model, dict.fromkeys(ARM_JOINTS, MAX_JOINT_SPEED)),

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from models.gripper_geometry import ROBOTIQ_2F85_CLASS
-from sr_mj.kinematics import TOOL_SITE, build_planning_model
+from sr_mj.kinematics import TOOL_SITE, build_planning_model, solid_geoms
 
 # Between two spheres of a row a capsule stands out by at most this much.
 _CAPSULE_GAP_M = 0.002
@@ -26,7 +26,7 @@ class PlacedBody:
     """The robot's body at M postures.
 
     Attributes:
-        is_free: (M,) whether links, gripper, table and bin keep clear of each other.
+        is_free: (M,) whether links and gripper keep clear of table, bin and each other.
         centers: (M, S, 3) centres of the links' spheres, metres.
         rotation: (M, 3, 3) orientation of the tool in the world.
         position: (M, 3) origin of the tool, metres.
@@ -55,8 +55,10 @@ class RobotBody:
     """Places the body; keeps no state between calls.
 
     Args:
-        max_overlap_m: Overlap that still counts as free; the fingertips of a low grasp may brush
-            the table.
+        max_overlap_m: Overlap with table and bin that still counts as free; the fingertips of a
+            low grasp may brush the table.
+        self_margin_m: Distance that links and gripper keep from each other: the arm follows its
+            trajectory to about a millimetre, and a link that catches on another stays there.
 
     Attributes:
         radius_m: (S,) radii of the links' spheres, from the shoulder to the wrist.
@@ -64,10 +66,13 @@ class RobotBody:
             last two of the wrist.
     """
 
-    def __init__(self, max_overlap_m: float = 0.001) -> None:
+    def __init__(self, max_overlap_m: float = 0.001, self_margin_m: float = 0.005) -> None:
         """Compile the planning model and lay spheres along its capsules."""
-        self._max_overlap_m = max_overlap_m
+        self._max_overlap_m, self._self_margin_m = max_overlap_m, self_margin_m
         self._model = build_planning_model()
+        robot, _ = solid_geoms(self._model)
+        self._is_robot = np.isin(np.arange(self._model.ngeom), robot)
+        self._model.geom_margin[robot] = self_margin_m
         self._data = mujoco.MjData(self._model)
         self._site = self._model.site(TOOL_SITE).id
         capsules = np.flatnonzero(self._model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE)
@@ -93,8 +98,7 @@ class RobotBody:
         for row, posture in enumerate(qpos):
             data.qpos[:] = posture
             mujoco.mj_kinematics(model, data)
-            mujoco.mj_collision(model, data)
-            is_free[row] = data.ncon == 0 or data.contact.dist.min() >= -self._max_overlap_m
+            is_free[row] = self._keeps_clear()
             axis = data.geom_xmat[self._geom, 2::3]
             centers[row] = data.geom_xpos[self._geom] + self._along[:, None] * axis
             rotation[row], position[row] = data.site_xmat[self._site], data.site_xpos[self._site]
@@ -112,9 +116,18 @@ class RobotBody:
         for row, posture in enumerate(qpos):
             data.qpos[:] = posture
             mujoco.mj_kinematics(model, data)
-            mujoco.mj_collision(model, data)
-            free[row] = data.ncon == 0 or data.contact.dist.min() >= -self._max_overlap_m
+            free[row] = self._keeps_clear()
         return free
+
+    def _keeps_clear(self) -> bool:
+        """Tell whether the body, where it was put, keeps clear of table, bin and itself."""
+        mujoco.mj_collision(self._model, self._data)
+        if not self._data.ncon:
+            return True
+        contact = self._data.contact
+        is_own = self._is_robot[contact.geom].all(axis=1)
+        least = np.where(is_own, self._self_margin_m, -self._max_overlap_m)
+        return bool((contact.dist >= least).all())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,6 @@
 import itertools
 
+import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -8,9 +9,12 @@ from models.tabletop import BIN_CENTER, BIN_HALF_M, BIN_HEIGHT_M
 from models.ur5 import HOME_QPOS
 from policy.actions import ActionCandidates
 from sr_mj.candidates.held import HeldObject
+from sr_mj.kinematics import build_planning_model
 from sr_mj.planning import PLACE_PHASES, Phase, Planner
 from sr_mj.planning.body import RobotBody
 from sr_mj.planning.clearance import Clearance
+from sr_mj.planning.motion import Connector
+from sr_mj.trajectory import fit_path
 
 
 def places(*poses, width_m=0.04):
@@ -172,3 +176,27 @@ def test_a_long_object_is_lifted_over_the_wall_of_the_bin(planner, start, pose_d
         points = long.points_tool @ pose[:3, :3].T + pose[:3, 3]
         beside = np.abs(points[:, :2] - BIN_CENTER[:2]).max(axis=1) - BIN_HALF_M
         assert points[np.abs(beside) < 0.005, 2].min(initial=1.0) > BIN_HEIGHT_M - 0.005
+
+
+def test_the_gripper_keeps_clear_of_the_forearm(planner, start):
+    # Straight in the joints, the wrist would turn the palm 0.9 mm into the forearm on the way.
+    goal = np.array([-2.70, -1.23, -1.69, -1.79, -4.71, 0.70])
+    motions = Connector(config=planner.config, searches_left=1)
+    path = motions.connect(start, goal, Clearance(body=RobotBody()))
+    assert path.is_searched
+    model = build_planning_model()
+    data = mujoco.MjData(model)
+    forearm = int(model.body("ur5/forearm_link").geomadr[0]) + 1
+    assert model.geom(forearm).type == mujoco.mjtGeom.mjGEOM_CAPSULE
+    palm = model.ngeom - 1
+
+    def least_gap(postures):
+        gaps = []
+        for data.qpos[:] in postures:
+            mujoco.mj_kinematics(model, data)
+            gaps.append(mujoco.mj_geomDistance(model, data, forearm, palm, 0.3, None))
+        return min(gaps)
+
+    along = np.linspace(0, 1, 300)
+    assert -0.001 < least_gap(start + along[:, None] * (goal - start)) < 0
+    assert least_gap(fit_path(path.waypoints)(along)) > 0.0045
