@@ -12,7 +12,7 @@ Scores = dict[Group, dict[str, Score]]
 
 
 def noise(lines: Lines) -> str:
-    """Return unseen grasping under noise of points and of the sensor, as the paper's table 4."""
+    """Return unseen grasping, with mean steps, under noise: the paper's table 4, and the sensor's."""
     conditions = ("clean", *NOISE_LEVELS)
     scores = _scores(lines)
     groups = [Group(task="grasp", split="unseen", condition=c) for c in conditions]
@@ -21,7 +21,7 @@ def noise(lines: Lines) -> str:
         printed = dict(zip(TABLE_4_LEVELS.values(), map(str, values), strict=True))
         rows.append([f"*paper: {name}*", *(printed.get(c, "") for c in conditions)])
     rows += [
-        [title(label), *(_success(scores, group, label) for group in groups)]
+        [title(label), *(_with_steps(scores, group, label) for group in groups)]
         for label in _labels(scores, groups[1:])
     ]
     return markdown(["", *conditions], rows)
@@ -93,3 +93,8 @@ def _labels(scores: Scores, groups: Iterable[Group]) -> list[str]:
 def _success(scores: Scores, group: Group, label: str) -> str:
     found = scores.get(group, {}).get(label)
     return percent(found.success) if found else ""
+
+
+def _with_steps(scores: Scores, group: Group, label: str) -> str:
+    found = scores.get(group, {}).get(label)
+    return f"{percent(found.success)}, {found.steps:.1f}" if found else ""

@@ -50,7 +50,8 @@ class PlannerConfig:
         touch_m: How far cloud points may reach into gripper and wrist on the straight ways; the
             cloud's own thickness.
         settle_m: Height over its place below which a held object may touch the cloud.
-        num_tried: Candidates that are tried, best first, until one has a plan.
+        num_tried: Candidates with a good verdict that are planned, best first, until one has a
+            plan.
         limits: Joint limits for free motion.
         approach_speed: Fraction of the limits for the straight ways.
         carry_speed: Fraction of the limits while an object is held.

@@ -4,6 +4,8 @@ For every candidate the closed form gives all postures along the straight ways; 
 from the best posture within its limits; free motions join them.
 """
 
+import itertools
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,10 +95,10 @@ class Planner:
                 the fingers stays.
 
         Returns:
-            The plan, or None if none of the first `num_tried` candidates can be reached without
-            collision.
+            The plan, or None if no candidate, or none of the first `num_tried` that have a good
+            verdict beside the obstacles, can be reached without collision.
         """
-        order = np.asarray(order, int)[: self.config.num_tried]
+        order = np.asarray(order, int)
         if not len(order):
             return None
         task = PlanningTask(
@@ -107,8 +109,8 @@ class Planner:
             start=np.asarray(HOME_QPOS if start is None else start, float),
             over_bin=self.postures_over_bin,
         )
-        is_reachable = find_reachable(candidates.take(order), task.links, self.config)
-        for index in order[is_reachable]:
+        good = self._reachable_in_order(candidates, order, task)
+        for index in itertools.islice(good, self.config.num_tried):
             pose, width_m = candidates.Ts_world_tool[index], float(candidates.width_m[index])
             if candidates.kind == "pick":
                 drafted = plan_pick(task, pose, width_m, shake_off=shake_off)
@@ -116,10 +118,19 @@ class Planner:
                 drafted = plan_place(task, pose, width_m, held)
             if drafted is not None:
                 return Plan(
-                    chosen=int(index),
+                    chosen=index,
                     T_world_tool=pose,
                     segments=drafted.segments,
                     kind=candidates.kind,
                     searched=drafted.searched,
                 )
         return None
+
+    def _reachable_in_order(
+        self, candidates: ActionCandidates, order: np.ndarray, task: PlanningTask
+    ) -> Iterator[int]:
+        """Yield the candidates with a good verdict, which is found for a few at a time."""
+        for first in range(0, len(order), self.config.num_tried):
+            few = order[first : first + self.config.num_tried]
+            is_good = find_reachable(candidates.take(few), task.links, self.config)
+            yield from few[is_good].tolist()

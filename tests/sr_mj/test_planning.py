@@ -150,6 +150,12 @@ def test_takes_the_first_candidate_that_can_be_reached(planner, near, far):
     assert plan.chosen == 2
 
 
+def test_what_cannot_be_reached_is_not_counted_as_tried(planner, near, far):
+    many = 2 * planner.config.num_tried + 5
+    plan = planner.plan(candidates(*[far] * many, near), np.arange(many + 1))
+    assert plan is not None and plan.chosen == many
+
+
 def test_nothing_reachable_is_no_plan(planner, far, pose_down):
     assert planner.plan(candidates(far), FIRST) is None
     assert planner.plan(candidates(), np.array([], int)) is None

@@ -97,7 +97,7 @@ def rate(records):
 
 def test_noise_stands_beside_the_plain_condition_and_the_paper(lines):
     plain = chosen(lines, "sr", "grasp", "unseen")
-    some = under(plain, "clean") | under(plain, "points-0.2", success=False)
+    some = under(plain, "clean") | under(plain, "points-0.2", success=False, num_actions=8)
     some |= under(chosen(lines, "sr", "grasp", "seen"), "points-0.1")
     some |= under(plain, "l515-4x", policy="sr@softmax")
     table = cells(BLOCKS["noise"](some))
@@ -110,7 +110,7 @@ def test_noise_stands_beside_the_plain_condition_and_the_paper(lines):
     ]
     assert table["*paper: ReLU²*"]["points-0.2"] == "78.1"
     assert table["`sr`"]["clean"].startswith(f"{rate(plain)} [")
-    assert table["`sr`"]["points-0.2"] == "0.0 [0, 5]"
+    assert table["`sr`"]["points-0.2"] == "0.0 [0, 5], 8.0"
     assert table["`sr`"]["points-0.1"] == ""
     assert table["`sr@softmax`"]["l515-4x"] == table["`sr`"]["clean"]
     assert table["`sr@softmax`"]["clean"] == ""
