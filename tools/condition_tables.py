@@ -12,7 +12,7 @@ Scores = dict[Group, dict[str, Score]]
 
 
 def noise(lines: Lines) -> str:
-    """Return unseen grasping, with mean steps, under noise: the paper's table 4, and the sensor's."""
+    """Return unseen grasping under noise, with mean steps: the paper's table 4 and the sensor."""
     conditions = ("clean", *NOISE_LEVELS)
     scores = _scores(lines)
     groups = [Group(task="grasp", split="unseen", condition=c) for c in conditions]
