@@ -33,6 +33,7 @@ class TablesConfig:
     results: tuple[Path, ...] = (
         Path("docs/results/arrangements"),
         Path("docs/results/first-grasps"),
+        Path("docs/results/conditions"),
         Path("docs/results/held-out-cluttered15"),
         Path("docs/results/held-out-place8"),
     )
