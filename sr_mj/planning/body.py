@@ -91,14 +91,12 @@ class RobotBody:
         Returns:
             Where it is and whether it is free.
         """
-        model, data = self._model, self._data
+        data = self._data
         is_free = np.empty(len(qpos), bool)
         centers = np.empty((len(qpos), len(self._geom), 3))
         rotation, position = np.empty((len(qpos), 9)), np.empty((len(qpos), 3))
         for row, posture in enumerate(qpos):
-            data.qpos[:] = posture
-            mujoco.mj_kinematics(model, data)
-            is_free[row] = self._keeps_clear()
+            is_free[row] = self._put(posture)
             axis = data.geom_xmat[self._geom, 2::3]
             centers[row] = data.geom_xpos[self._geom] + self._along[:, None] * axis
             rotation[row], position[row] = data.site_xmat[self._site], data.site_xpos[self._site]
@@ -111,16 +109,12 @@ class RobotBody:
 
     def is_free(self, qpos: np.ndarray) -> np.ndarray:
         """Tell which postures (M, 6) keep clear of table, bin and the robot itself, (M,)."""
-        model, data = self._model, self._data
-        free = np.empty(len(qpos), bool)
-        for row, posture in enumerate(qpos):
-            data.qpos[:] = posture
-            mujoco.mj_kinematics(model, data)
-            free[row] = self._keeps_clear()
-        return free
+        return np.fromiter(map(self._put, qpos), bool, len(qpos))
 
-    def _keeps_clear(self) -> bool:
-        """Tell whether the body, where it was put, keeps clear of table, bin and itself."""
+    def _put(self, posture: np.ndarray) -> bool:
+        """Put the body in a posture; tell whether it keeps clear of table, bin and itself."""
+        self._data.qpos[:] = posture
+        mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_collision(self._model, self._data)
         if not self._data.ncon:
             return True
