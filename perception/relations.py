@@ -7,22 +7,26 @@ RELATIONS = tuple(sorted((*INSIDE_RELATIONS, *OUTSIDE_RELATIONS), key=len, rever
 
 # The protocol knows no directions: left of, right of, behind and in front of mean "next to".
 _SYNONYMS = {
-    "on top of": ("atop", "on the top of", "on top"),
-    "on": ("onto", "upon"),
-    "in": ("into", "inside of", "inside", "within", "in to"),
+    "on top of": ("atop", "on the top of", "to the top of", "on top"),
+    "on": ("onto", "upon", "on to"),
+    "in": ("into", "inside of", "inside", "within", "in to", "to the inside of",
+           "on the inside of"),
     "to": ("over to", "towards", "toward"),
     "surrounding to": ("surrounding",),
     "close to": ("close by", "not far from", "not too far from", "closely to", "closer to",
-                 "in close proximity to", "in proximity to"),
+                 "in close proximity to", "in proximity to", "as close as possible to",
+                 "as close as you can to", "as near as possible to", "as close to", "as near to"),
     "next to": (
         "adjacent to", "by the side of", "at the side of", "on the side of", "to the side of",
         "to the left of", "to the right of", "on the left of", "on the right of", "left of",
-        "right of", "behind", "in front of",
+        "right of", "behind", "in front of", "against",
     ),
-    "beside": ("besides", "alongside", "along side"),
-    "around": ("round", "somewhere around"),
-    "near": ("nearby to", "nearby", "near to", "nearer to", "in the vicinity of",
-             "in the neighbourhood of", "in the neighborhood of", "by", "at"),
+    "beside": ("besides", "alongside", "along side", "side by side with"),
+    "around": ("round", "round about", "somewhere around"),
+    "near": ("nearby to", "nearby", "near to", "nearer to", "nearer", "in the vicinity of",
+             "in the neighbourhood of", "in the neighborhood of", "neighbouring",
+             "neighboring", "within reach of",
+             "within a few centimetres of", "within a few centimeters of", "by", "at"),
 }  # fmt: skip
 _CANONICAL = {phrase: name for name, phrases in _SYNONYMS.items() for phrase in phrases}
 _CANONICAL |= {name: name for name in RELATIONS}

@@ -22,6 +22,9 @@ from tools import condition_tables
 from tools.random_tables import random_table
 from tools.table_text import COLUMNS, ORDER, SPLITS, TASKS, markdown, percent, points, title
 
+WEIGHTLESS = ("clip-grounding", "lerf-togo", "think-grasp", "raw-image-grid", "raw-image", "vlp")
+"""Rules that the paper compares with; not `grounding`, which is run everywhere."""
+
 Cells = dict[tuple[str, str], dict[str, Score]]
 """Scores by policy, for every task and kind of objects."""
 
@@ -45,14 +48,28 @@ class TablesConfig:
 
 
 def clean_scores(lines: Lines) -> Cells:
-    """Count successes under plain conditions, of policies that ran all arrangements of a suite."""
+    """Count successes under plain conditions, of policies that ran all episodes of a suite."""
     cells = {}
     for group, found in _clean(lines).items():
-        scores = {label: score(label, own) for label, own in found.items()}
-        every = max(s.num_scenes for s in scores.values())
+        every = max(map(len, found.values()))
         cells[group.task, group.split] = {
-            label: s for label, s in scores.items() if s.num_scenes == every
+            label: score(label, own) for label, own in found.items() if len(own) == every
         }
+    return cells
+
+
+def scores_beside_weightless(lines: Lines) -> Cells:
+    """Count successes on the episodes that all of `WEIGHTLESS` ran, of all who ran them too."""
+    cells = {}
+    for group, found in _clean(lines).items():
+        ran = {label: {_run(r): r for r in own} for label, own in found.items()}
+        if theirs := [set(own) for label, own in ran.items() if label in WEIGHTLESS]:
+            shared = set.intersection(*theirs)
+            cells[group.task, group.split] = {
+                label: score(label, [own[run] for run in sorted(shared)])
+                for label, own in ran.items()
+                if shared and shared <= own.keys()
+            }
     return cells
 
 
@@ -70,11 +87,21 @@ def overview(lines: Lines) -> str:
     return markdown(heading, rows)
 
 
-def task_table(task: str) -> Callable[[Lines], str]:
-    """Return a function that makes the table of one task, beside the paper's figures."""
+def task_table(
+    task: str, scores: Callable[[Lines], Cells] = clean_scores
+) -> Callable[[Lines], str]:
+    """Return a function that makes the table of one task, beside the paper's figures.
+
+    Args:
+        task: Task.
+        scores: Counts what stands in it.
+
+    Returns:
+        From lines to the table.
+    """
 
     def table(lines: Lines) -> str:
-        cells = clean_scores(lines)
+        cells = scores(lines)
         present = [
             label for label in ORDER if any(label in cells.get((task, s), {}) for s in SPLITS)
         ]
@@ -95,18 +122,6 @@ def task_table(task: str) -> Callable[[Lines], str]:
         return markdown(heading, rows)
 
     return table
-
-
-def first_grasps(lines: Lines) -> str:
-    """Return grasping on the seen arrangements that the policies without weights have run."""
-    found = next(own for g, own in _clean(lines).items() if (g.task, g.split) == ("grasp", "seen"))
-    scenes = {record["scene"] for record in found["clip-grounding"]}
-    rows = []
-    for label in (label for label in ORDER if label in found):
-        s = score(label, [record for record in found[label] if record["scene"] in scenes])
-        paper = _published("grasp", label, "seen").replace(", ", " / ").strip("*")
-        rows.append([title(label), percent(s.success), f"{s.steps:.2f}", paper])
-    return markdown(["policy", f"{len(scenes)} seen arrangements", "steps", "paper"], rows)
 
 
 def differences(lines: Lines) -> str:
@@ -131,7 +146,7 @@ def differences(lines: Lines) -> str:
 BLOCKS: dict[str, Callable[[Lines], str]] = {
     "overview": overview,
     **{task: task_table(task) for task in TASKS},
-    "first-grasps": first_grasps,
+    **{f"weightless-{task}": task_table(task, scores_beside_weightless) for task in TASKS},
     "differences": differences,
     "random-cluttered15": random_table("cluttered15", "seen"),
     "random-place8": random_table("place8", "seen"),
@@ -176,6 +191,10 @@ def _clean(lines: Lines) -> dict[Group, dict[str, list[dict[str, Any]]]]:
         for group, records in by_group(lines).items()
         if group.condition == "clean" and group.task in TASKS
     }
+
+
+def _run(record: dict[str, Any]) -> tuple[str, int]:
+    return record["scene"], record["seed"]
 
 
 def _with_steps(found: Score, task: str) -> str:

@@ -1,3 +1,6 @@
+import json
+from pathlib import Path
+
 import pytest
 
 from perception.errors import InvalidTextError
@@ -38,6 +41,7 @@ from perception.relations import INSIDE_RELATIONS, PHRASES, RELATIONS, canonical
         ("I am hungry.", "something to eat"),
         # Anything else falls back to the whole sentence.
         ("the weather is nice", "weather is nice"),
+        ("by the way, give me the mug", "mug"),
         ("put it", "put it"),
     ],
 )
@@ -101,6 +105,24 @@ def test_combined_templates(text: str, parts: tuple[str, str, str]) -> None:
          ("salt and pepper shaker", "next to", "cup")),
         ("take it and put it inside the bowl", (None, "in", "bowl")),
         ("move this over to the bowl", (None, "to", "bowl")),
+        # Words that tell how belong to neither object.
+        ("give me the pear, lay it up on the tape", ("pear", "on", "tape")),
+        ("I would like to have it up on the soap", (None, "on", "soap")),
+        ("put it ever so lightly on the soap", (None, "on", "soap")),
+        ("set the mug down a bit closer to the box", ("mug", "close to", "box")),
+        ("put the red cup upside down on the box", ("red cup", "on", "box")),
+        # Somebody says it before and after, or leaves it out.
+        ("any chance you could stick that in the mug, please", (None, "in", "mug")),
+        ("perfect! now put it near the can, then go home", (None, "near", "can")),
+        ("next to the apple", (None, "next to", "apple")),
+        ("put on the plate", (None, "on", "plate")),
+        ("what you are holding goes in the bowl", (None, "in", "bowl")),
+        ("great, you've got it; put it in the bowl", (None, "in", "bowl")),
+        # What was named before: the reference, or what to pick.
+        ("see that cup? put it down right by it", (None, "near", "cup")),
+        ("do you see the red box? put the pear next to it", ("pear", "next to", "red box")),
+        ("there is a marker on the table. stick it in the mug", ("marker", "in", "mug")),
+        ("I think the peach is ripe, put it in the bowl", ("peach", "in", "bowl")),
     ],
 )  # fmt: skip
 def test_composite_paraphrases(text: str, parts: tuple[str | None, str, str]) -> None:
@@ -136,7 +158,30 @@ def test_every_phrase_means_a_relation() -> None:
         assert parts.relation == canonical_relation(phrase)
 
 
-@pytest.mark.parametrize("text", ["put the cup " * 300, "and, " * 500, "put " + "a" * 3000])
+def test_sentences_written_without_knowing_the_rules() -> None:
+    entries = json.loads(Path(__file__).with_name("place_wordings.json").read_text())
+    wrong = {e["text"] for e in entries if not is_understood(e)}
+    assert len(entries) == 416
+    assert wrong == {e["text"] for e in entries if not e["is_understood"]}
+
+
+def is_understood(entry: dict[str, str | None]) -> bool:
+    parts = parse_instruction(str(entry["text"]))
+    found = (parts.target, parts.region, parts.reference)
+    return found == (entry["target"], entry["region"], entry["reference"])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "put the cup " * 300,
+        "and, " * 500,
+        "put " + "a" * 3000,
+        "please now " * 300,
+        "now then and so it is " * 100 + "put it",
+        "put it " + "really quite " * 300,
+    ],
+)
 def test_long_texts_end_soon(text: str) -> None:
     assert parse_instruction(text).text == text.strip()
 

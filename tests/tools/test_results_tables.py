@@ -169,3 +169,22 @@ def test_scenes_that_were_run_once_are_compared_as_scenes(lines):
 def test_one_attempt_needs_no_count_of_steps(lines):
     heading, *_ = BLOCKS["random-place8"](lines).splitlines()
     assert heading == "| policy | 100 scenes | SR minus this: success |"
+
+
+def test_rules_without_weights_stand_beside_who_ran_the_same(lines):
+    plain = chosen(lines, "oracle", "grasp", "seen")
+    some = under(plain, "clean", policy="sr", privileged=False, success=False, num_actions=8)
+    first, rest = plain[:20], plain[20:]
+    some |= under(first, "clean", policy="sr", privileged=False, success=True, num_actions=1)
+    some |= under(first, "clean", policy="lerf-togo", success=True, num_actions=2)
+    some |= under(plain[:24], "clean", policy="raw-image", success=True, num_actions=4)
+    # Who left some of those out has no row.
+    some |= under(plain[1:], "clean", policy="a2", success=True, num_actions=1)
+    some |= under(rest, "clean", policy="vlg", success=True, num_actions=1)
+    assert BLOCKS["weightless-grasp"](some).splitlines()[2:] == [
+        "| `sr` | 100 [84, 100] | 1.00 | 92.0 / 2.34 | | | 92.4 / 2.50 |",
+        "| `lerf-togo` | 100 [84, 100] | 2.00 | 83.3 / 3.37 | | | 76.2 / 2.01 |",
+        "| `raw-image` | 100 [84, 100] | 4.00 | 48.1 / 4.35 | | | 45.3 / 5.37 |",
+    ]
+    # And in the table of all runs stands who ran all.
+    assert list(cells(BLOCKS["grasp"](some))) == ["`sr`"]
