@@ -6,6 +6,7 @@ import numpy as np
 
 from sr_mj.attempt import Attempt
 from sr_mj.episode import has_succeeded, is_handed_over
+from sr_mj.instruction import describe_reading
 from sr_mj.outcome import Reason
 from sr_mj.scene import Scene
 
@@ -30,12 +31,13 @@ _PHRASES = {
 
 
 def describe_scene(scene: Scene) -> str:
-    """Introduce a scene in two lines."""
+    """Introduce a scene in three lines: what it is, what is asked for, and how that is read."""
     num = len(scene.objects)
     return (
         f"Scene  {scene.config.title}, "
         f"{num} object{'' if num == 1 else 's'}\n"
-        f"Goal   {scene.goal.text!r}"
+        f"Goal   {scene.goal.text!r}\n"
+        f"Read   {describe_reading(scene.goal.text)}"
     )
 
 

@@ -32,6 +32,24 @@ def names_target(text: str) -> bool:
     return parse_instruction(text).target is not None
 
 
+def describe_reading(text: str) -> str:
+    """Tell how an instruction is read: "pick 'apple', place it near 'bowl'".
+
+    Args:
+        text: The instruction.
+
+    Returns:
+        What is looked for, in one line.
+    """
+    instruction = parse_instruction(text)
+    parts = []
+    if instruction.target is not None:
+        parts.append(f"pick {instruction.target!r}")
+    if instruction.relation is not None:
+        parts.append(f"place it {instruction.relation} {instruction.reference!r}")
+    return ", ".join(parts)
+
+
 def pick_text(text: str) -> PhaseText:
     """Return the part of an instruction that says what to pick.
 

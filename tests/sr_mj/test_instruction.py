@@ -1,7 +1,13 @@
 import pytest
 
 from perception.relations import INSIDE_RELATIONS, OUTSIDE_RELATIONS
-from sr_mj.instruction import PhaseText, names_target, pick_text, place_text
+from sr_mj.instruction import (
+    PhaseText,
+    describe_reading,
+    names_target,
+    pick_text,
+    place_text,
+)
 
 
 @pytest.mark.parametrize("text", ["give me the pear", "get something to eat", "a violin"])
@@ -33,3 +39,17 @@ def test_a_combined_instruction_is_divided():
     assert place_text(text) == PhaseText(
         phase="place", text="put it near the apple", relation="near", side="outside"
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "reading"),
+    [
+        ("Give me the pear", "pick 'pear'"),
+        ("put it up on the soap", "place it on 'soap'"),
+        ("I want a strawberry, put it into the mug", "pick 'strawberry', place it in 'mug'"),
+        # Not understood: all of it is looked for.
+        ("the weather is nice", "pick 'weather is nice'"),
+    ],
+)
+def test_how_an_instruction_is_read_is_told(text, reading):
+    assert describe_reading(text) == reading

@@ -65,7 +65,8 @@ def test_the_main_job_end_to_end(command, tmp_path):
     lines = done.stdout.splitlines()
     assert lines[0] == "Scene  cluttered15 (seen, seed 4), 15 objects"
     assert re.fullmatch(r"Goal   '.+'", lines[1])
-    assert lines[2] == "Policy sr, encoder embedded"
+    assert re.fullmatch(r"Read   pick '.+'", lines[2])
+    assert lines[3] == "Policy sr, encoder embedded"
     assert re.match(r"Result (success|failure): .+ \[[\d.]+ s\]$", lines[-1])
 
     out = tmp_path / "o"
@@ -73,7 +74,7 @@ def test_the_main_job_end_to_end(command, tmp_path):
     assert about["config"]["seed"] == 4 and about["versions"]["mujoco"].startswith("3.")
     result = json.loads((out / "result.json").read_text())
     attempts = [json.loads(line) for line in (out / "attempts.jsonl").read_text().splitlines()]
-    assert attempts == result["attempts"] and len(attempts) == len(lines) - 4
+    assert attempts == result["attempts"] and len(attempts) == len(lines) - 5
     assert attempts[0]["num_candidates"] > 20
     assert result["success"] == ("success" in lines[-1])
     for picture, size in {
