@@ -9,6 +9,7 @@ the lines do not have is left empty.
 
 import re
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,7 @@ class TablesConfig:
 
     results: tuple[Path, ...] = (
         Path("docs/results/arrangements"),
-        Path("docs/results/first-grasps"),
+        Path("docs/results/weightless"),
         Path("docs/results/conditions"),
         Path("docs/results/held-out-cluttered15"),
         Path("docs/results/held-out-place8"),
@@ -59,18 +60,28 @@ def clean_scores(lines: Lines) -> Cells:
 
 
 def scores_beside_weightless(lines: Lines) -> Cells:
-    """Count successes on the episodes that all of `WEIGHTLESS` ran, of all who ran them too."""
+    """Count successes on what all of `WEIGHTLESS` ran, of all who ran it too.
+
+    Seeds that they did not run in all scenes are left out: every scene counts as much.
+    """
     cells = {}
     for group, found in _clean(lines).items():
         ran = {label: {_run(r): r for r in own} for label, own in found.items()}
         if theirs := [set(own) for label, own in ran.items() if label in WEIGHTLESS]:
-            shared = set.intersection(*theirs)
+            shared = _complete(set.intersection(*theirs))
             cells[group.task, group.split] = {
                 label: score(label, [own[run] for run in sorted(shared)])
                 for label, own in ran.items()
                 if shared and shared <= own.keys()
             }
     return cells
+
+
+def _complete(runs: set[tuple[str, int]]) -> set[tuple[str, int]]:
+    """Leave out runs with seeds that not all scenes have."""
+    scenes = {scene for scene, _ in runs}
+    counts = Counter(seed for _, seed in runs)
+    return {(scene, seed) for scene, seed in runs if counts[seed] == len(scenes)}
 
 
 def overview(lines: Lines) -> str:
