@@ -128,7 +128,8 @@ def parse_instruction(text: str) -> Instruction:
         return Instruction(text=stripped, target=_pick_target(sentence))
     before, match = place
     target = match["x"] and reduce_phrase(match["x"])
-    reference = reduce_phrase(CLAUSE_END.split(_without_courtesies(match["reference"]))[0])
+    said = _without_courtesies(match["reference"])
+    reference = reduce_phrase(CLAUSE_END.split(said)[0] or said)
     named = _named(before)
     if named and re.fullmatch(_ANAPHOR, reference):
         reference = named

@@ -186,6 +186,11 @@ def test_long_texts_end_soon(text: str) -> None:
     assert parse_instruction(text).text == text.strip()
 
 
+@pytest.mark.parametrize("text", ["put it near because I said so", "put it on the, thanks"])
+def test_a_reference_is_never_empty(text: str) -> None:
+    assert parse_instruction(text).reference
+
+
 @pytest.mark.parametrize("text", ["", "   ", "?!", "\n"])
 def test_empty_instructions(text: str) -> None:
     with pytest.raises(InvalidTextError) as caught:
