@@ -51,4 +51,4 @@ def picked(clause: str) -> str | None:
     match = _PICK.fullmatch(clause)
     if match is None or not is_noun(match["x"]):
         return None
-    return _PICK_TAIL.sub("", CLAUSE_END.split(match["x"])[0])
+    return _PICK_TAIL.sub("", CLAUSE_END.split(match["x"])[0]) or None

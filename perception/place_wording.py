@@ -122,7 +122,7 @@ def match_place(clause: str) -> re.Match[str] | None:
     # A pattern for one clause must not reach over the next: "take it and put it in the bowl".
     for pattern in (*_PLACES, _PLACE_FIRST, *_PRONOUN_PLACES):
         match = pattern.fullmatch(clause)
-        if match is not None and not _is_split(match["x"]):
+        if match is not None and _is_named(match["reference"]) and not _is_split(match["x"]):
             return match
     return None
 
@@ -130,6 +130,10 @@ def match_place(clause: str) -> re.Match[str] | None:
 def match_place_alone(sentence: str) -> re.Match[str] | None:
     """Find a place in a sentence that says nothing else, as `match_place` does: "in the bowl"."""
     return _PLACE_ALONE.fullmatch(sentence)
+
+
+def _is_named(reference: str) -> bool:
+    return re.search(r"\w", reference) is not None
 
 
 def _is_split(phrase: str | None) -> bool:

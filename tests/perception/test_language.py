@@ -1,6 +1,8 @@
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from perception.errors import InvalidTextError
@@ -189,6 +191,20 @@ def test_long_texts_end_soon(text: str) -> None:
 @pytest.mark.parametrize("text", ["put it near because I said so", "put it on the, thanks"])
 def test_a_reference_is_never_empty(text: str) -> None:
     assert parse_instruction(text).reference
+
+
+def test_no_part_of_any_sentence_is_empty() -> None:
+    entries = json.loads(Path(__file__).with_name("place_wordings.json").read_text())
+    words = sorted({w for e in entries for w in re.findall(r"[\w'-]+|[,.;!?]", e["text"].lower())})
+    rng = np.random.default_rng(0)
+    for length in rng.integers(1, 20, size=5000):
+        text = " ".join(rng.choice([*words, *PHRASES], size=length))
+        if not re.search(r"\w", text):
+            continue
+        parts = parse_instruction(text)
+        assert parts.target_phrase.strip()
+        assert "" not in (parts.target, parts.reference), text
+        assert (parts.relation is None) == (parts.reference is None), text
 
 
 @pytest.mark.parametrize("text", ["", "   ", "?!", "\n"])
