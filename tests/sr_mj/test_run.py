@@ -161,7 +161,8 @@ def test_runs_a_place_arrangement(command, tmp_path):
     done = command("sr_mj.run", "--scene", "place-seen-01", "--policy", "oracle", "--out", "o")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert re.match(r"ho +\d+ grasps .*handed over: grasped toy_nut", lines[3])
+    assert lines[2] == "Read   place it near 'darlie box'"
+    assert re.match(r"ho +\d+ grasps .*handed over: grasped toy_nut", lines[4])
     assert re.match(r"pl +\d+ places .*placed toy_nut", lines[-2])
     assert lines[-1].startswith("Result success: toy_nut placed near darlie_box")
     record = json.loads((tmp_path / "o" / "result.json").read_text())
