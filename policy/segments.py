@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
-# Points stand for voxels of 8 mm: this joins those that share a face or an edge (11.3 mm).
-_NEIGHBOUR_M = 0.012
+NEIGHBOUR_M = 0.012
+"""Points this near are joined: of voxels of 8 mm, those that share a face or an edge (11.3 mm)."""
 # A valley this deep parts two tops. Depth is off by 1 to 2 mm after fusion.
 _MIN_VALLEY_M = 0.003
 MIN_POINTS = 10
@@ -28,7 +28,7 @@ def segment(points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     heights = points[:, 2].astype(np.float64)
-    pairs = KDTree(points).query_pairs(_NEIGHBOUR_M, output_type="ndarray")
+    pairs = KDTree(points).query_pairs(NEIGHBOUR_M, output_type="ndarray")
     passes = heights[pairs].min(axis=1)
     parents = list(range(len(points)))
     tops, sizes = heights.tolist(), [1] * len(points)

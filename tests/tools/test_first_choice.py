@@ -3,6 +3,7 @@ import re
 import pytest
 
 from policy.errors import InvalidConfigError
+from sr_mj.assemble import lifter_for
 from sr_mj.errors import UnknownNameError
 from sr_mj.evaluation.statistics import wilson
 from sr_mj.oracle import OraclePolicy
@@ -14,7 +15,7 @@ from tools.table_text import percent
 def test_right_choices_are_grasps_on_what_is_asked_for():
     bench = photograph("pickplace8", "seen", 100)
     oracle = OraclePolicy(bench.scene)
-    asked = decisions(bench, "embedded")
+    asked = decisions(bench, lifter_for(bench.scene.workspace, "embedded"))
     assert len(asked) >= 4
     gripped = oracle.gripped(asked[0].candidates)
     meant_by = []

@@ -15,6 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from perception.errors import EmptyCloudError
+from perception.lifter import MultiViewLifter
 from policy.actions import ActionCandidates
 from policy.base import Policy
 from policy.errors import InvalidConfigError
@@ -27,6 +28,7 @@ from sr_mj.instruction import pick_text
 from sr_mj.oracle import OraclePolicy
 from sr_mj.pipeline import observe
 from sr_mj.planning import Planner
+from sr_mj.scene import SceneConfig
 from sr_mj.view_images import ViewImages
 from tools.bench.grounding_scenes import BenchScene, list_questions, photograph
 from tools.table_text import markdown, percent, title
@@ -76,18 +78,17 @@ class Decision:
     is_right: np.ndarray
 
 
-def decisions(bench: BenchScene, encoder: str) -> list[Decision]:
+def decisions(bench: BenchScene, lifter: MultiViewLifter) -> list[Decision]:
     """Ask for everything in a scene that can be grasped.
 
     Args:
         bench: The scene.
-        encoder: Image and text encoder.
+        lifter: Perception stage, for the scene's workspace.
 
     Returns:
         A decision for each of the protocol's questions for which some candidate is right.
     """
     scene = bench.scene
-    lifter = lifter_for(scene.workspace, encoder)
     try:
         geometry = lifter.lift(bench.views).geometry
     except EmptyCloudError:
@@ -115,9 +116,10 @@ def main(config: FirstChoiceConfig) -> int:
         check_policy_name(name)
     right: dict[str, list[bool]] = {name: [] for name in config.policies}
     seconds = dict.fromkeys(config.policies, 0.0)
+    lifter = lifter_for(SceneConfig(scene=config.scene).kind.workspace, config.encoder)
     for seed in tqdm(range(*config.seeds), unit="scenes"):
         bench = photograph(config.scene, config.split, seed)
-        asked = decisions(bench, config.encoder)
+        asked = decisions(bench, lifter)
         for name in config.policies:
             policy, rng = make_policy(name, bench.scene), np.random.default_rng(seed)
             start = time.process_time()
