@@ -20,6 +20,7 @@ from sr_mj.evaluation.published import TABLE_1, TABLE_3, kind_of_policy
 from sr_mj.evaluation.results import Lines, read_lines
 from sr_mj.evaluation.summary import Group, Score, by_group, by_policy, compare, score
 from tools import condition_tables
+from tools.goal_tables import grasp_goals
 from tools.random_tables import random_table
 from tools.table_text import COLUMNS, ORDER, SPLITS, TASKS, markdown, percent, points, title
 
@@ -159,6 +160,7 @@ BLOCKS: dict[str, Callable[[Lines], str]] = {
     **{task: task_table(task) for task in TASKS},
     **{f"weightless-{task}": task_table(task, scores_beside_weightless) for task in TASKS},
     "differences": differences,
+    "grasp-goals": grasp_goals,
     "random-cluttered15": random_table("cluttered15", "seen"),
     "random-place8": random_table("place8", "seen"),
     "noise": condition_tables.noise,

@@ -116,6 +116,22 @@ def test_noise_stands_beside_the_plain_condition_and_the_paper(lines):
     assert table["`sr@softmax`"]["clean"] == ""
 
 
+def test_every_instruction_has_a_row(lines):
+    plain = chosen(lines, "sr", "grasp", "seen")
+    (scene,) = {r["scene"] for r in plain if r["goal"] == "give me the thera med"}
+    mine = [r for r in plain if r["scene"] == scene]
+    some = under(plain, "clean", success=True, num_actions=1)
+    some |= under(mine, "clean", success=False, num_actions=8)
+    some |= under(mine, "clean", policy="a2", num_actions=3)
+    some |= under(mine, "points-0.1", policy="grounding")
+    some |= under(chosen(lines, "oracle", "grasp", "unseen"), "clean", num_actions=2)
+    rows = BLOCKS["grasp-goals"](some).splitlines()[2:]
+    assert len(rows) == 15
+    assert "| seen | give me the thera med | 0.0 [0, 20] | 8.0 | 100 / 5.3 | 3.0 | | |" in rows
+    assert "| seen | I need a fruit | 100 [80, 100] | 1.0 | 90 / 3.3 | | | |" in rows
+    assert "| unseen | give me the shampoo | | | | | | 2.0 |" in rows
+
+
 def test_an_error_of_the_pose_is_told_by_split(lines):
     plain = chosen(lines, "a2", "place", "unseen")
     some = under(plain, "clean") | under(plain, "pose-1cm-5deg", success=True)
