@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from perception.lifter import Percept
 from perception.views import CameraView
 from policy.actions import ActionCandidates, ActionKind, ActionScores
@@ -45,6 +47,13 @@ class Attempt:
     outcome: Outcome
     is_hand_over: bool = False
     seconds: dict[str, float]
+
+    @property
+    def chosen_pose(self) -> np.ndarray | None:
+        """The pose (4, 4) that was chosen, without any error of its execution; None if none was."""
+        if self.plan is None or self.candidates is None:
+            return None
+        return self.candidates.Ts_world_tool[self.plan.chosen]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ This is the one way through the system; command lines and evaluation only start 
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -16,10 +15,12 @@ from policy.actions import ActionCandidates
 from sr_mj.attempt import Attempt, Stopwatch
 from sr_mj.beginning import Beginning, HandOver
 from sr_mj.candidates.held import HeldObject, held_object
+from sr_mj.choice import plan_choice
 from sr_mj.instruction import names_target, pick_text, place_text
 from sr_mj.memory import FailedGrasps
 from sr_mj.oracle import OraclePolicy
 from sr_mj.outcome import Outcome, Reason
+from sr_mj.perturbation import PoseError
 from sr_mj.pipeline import EpisodeRngs, Pipeline, observe
 from sr_mj.planning import Plan
 from sr_mj.scene import Scene
@@ -129,7 +130,7 @@ def hand_over(
     Returns:
         The state that this leads to: that of the scene as it is if nothing is to be handed over.
     """
-    rngs, attempts, describe_held = EpisodeRngs.from_seed(seed), [], None
+    rngs, attempts, describe_held = EpisodeRngs.of_episode(scene, seed), [], None
     if is_handed_over(scene):
         picking = pipeline.handing_over(OraclePolicy(scene))
         for attempt in _pick(scene, picking, rngs, max_attempts):
@@ -157,8 +158,8 @@ def _pick(
     for index in range(max_attempts):
         situation = first if first is not None and index == 0 else None
         situation = situation or _assess_grasps(scene, pipeline, rngs, failed)
-        attempt = _attempt(scene, pipeline, rngs, index, situation)
-        failed.record(attempt.plan, attempt.outcome)
+        attempt = _attempt(scene, pipeline, rngs, index, situation, _draw_error(pipeline, rngs))
+        failed.record(attempt.chosen_pose, attempt.outcome)
         yield attempt
         if attempt.outcome.success or attempt.outcome.reason is Reason.NOTHING_IN_SIGHT:
             return
@@ -172,15 +173,21 @@ def _place(
     first: Situation | None = None,
 ) -> Iterator[Attempt]:
     """Put down what is held, once; look again while no place for it is found."""
+    # Of one action there is one error, however often it takes to find a place.
+    error = _draw_error(pipeline, rngs)
     for index in range(PLACE_LOOKS):
         situation = first if first is not None and index == 0 else None
         situation = situation or _assess_places(scene, pipeline, rngs, describe_held)
-        attempt = _attempt(scene, pipeline, rngs, index, situation)
+        attempt = _attempt(scene, pipeline, rngs, index, situation, error)
         yield attempt
         reason = attempt.outcome.reason
         is_lost = pipeline.keep_unreachable and reason is Reason.UNREACHABLE
         if is_lost or not reason.is_idle:
             return
+
+
+def _draw_error(pipeline: Pipeline, rngs: EpisodeRngs) -> PoseError | None:
+    return None if pipeline.perturbation is None else pipeline.perturbation.draw(rngs.perturbation)
 
 
 def _assess_grasps(
@@ -211,7 +218,12 @@ def _inside(zone: Workspace | None, candidates: ActionCandidates) -> ActionCandi
 
 
 def _attempt(
-    scene: Scene, pipeline: Pipeline, rngs: EpisodeRngs, index: int, situation: Situation
+    scene: Scene,
+    pipeline: Pipeline,
+    rngs: EpisodeRngs,
+    index: int,
+    situation: Situation,
+    error: PoseError | None,
 ) -> Attempt:
     """Decide, plan, act."""
     watch = Stopwatch(dict(situation.seconds))
@@ -228,9 +240,7 @@ def _attempt(
             scores = pipeline.policy.score(observation, candidates, rngs.policy)
         with watch.measure("plan"):
             order = np.argsort(-scores.logits, kind="stable")
-            cloud = percept.geometry
-            is_kept = scene.goal.place is not None
-            plan = _plan(pipeline, rngs, candidates, order, cloud, situation.held, is_kept=is_kept)
+            plan = plan_choice(scene, pipeline, situation, order, error)
         with watch.measure("act"):
             outcome = _act(scene, pipeline, proposed, plan)
     return Attempt(
@@ -246,36 +256,6 @@ def _attempt(
         outcome=outcome,
         seconds=watch.seconds,
     )
-
-
-def _plan(
-    pipeline: Pipeline,
-    rngs: EpisodeRngs,
-    candidates: ActionCandidates,
-    order: np.ndarray,
-    cloud: GeometryCloud,
-    held: HeldObject | None,
-    *,
-    is_kept: bool,
-) -> Plan | None:
-    # With unreachable candidates among them, the policy's choice is final.
-    order = order[:1] if pipeline.keep_unreachable else order
-    start = None if held is None else pipeline.executor.drive.arm_qpos
-    shake_off = is_kept and pipeline.shakes_off
-    make = partial(pipeline.planner.plan, held=held, start=start, shake_off=shake_off)
-    plan = make(candidates, order, obstacles=cloud.points)
-    if plan is None or pipeline.perturbation is None:
-        return plan
-    # An error is nothing that a planner knows: it does not change the choice, and where the erring
-    # pose touches something, that is what the robot runs into.
-    erring = pipeline.perturbation.apply(
-        candidates.take(np.array([plan.chosen])), rngs.perturbation
-    )
-    for obstacles in (cloud.points, None):
-        erred = make(erring, np.array([0]), obstacles=obstacles)
-        if erred is not None:
-            return replace(erred, chosen=plan.chosen)
-    return None
 
 
 def _act(

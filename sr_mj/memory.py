@@ -4,7 +4,6 @@ import numpy as np
 
 from policy.actions import ActionCandidates
 from sr_mj.outcome import Outcome
-from sr_mj.planning import Plan
 
 _NEAR_M = 0.015
 _NEAR_RAD = np.radians(30)
@@ -20,17 +19,18 @@ class FailedGrasps:
         """Start with an empty memory."""
         self._poses: list[np.ndarray] = []
 
-    def record(self, plan: Plan | None, outcome: Outcome) -> None:
+    def record(self, T_world_tool: np.ndarray | None, outcome: Outcome) -> None:
         """Remember a failed grasp; forget all once something was carried away.
 
         Args:
-            plan: What was executed, if anything was.
+            T_world_tool: (4, 4) pose that was chosen, without any error of its execution; None if
+                nothing was executed.
             outcome: What came of it.
         """
         if outcome.felt_to_end:
             self._poses.clear()
-        elif plan is not None:
-            self._poses.append(plan.T_world_tool)
+        elif T_world_tool is not None:
+            self._poses.append(T_world_tool)
 
     def without(self, candidates: ActionCandidates) -> ActionCandidates:
         """Leave out candidates that repeat a failed grasp, unless no others would remain.

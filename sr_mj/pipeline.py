@@ -1,5 +1,6 @@
 """The stages of the system, put together."""
 
+import zlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,9 @@ from sr_mj.self_filter import hide_robot
 from sr_mj.sensors.capture import capture_views
 from sr_mj.sensors.l515 import L515NoiseConfig
 from sr_mj.sensors.renderer import CameraRig
+
+# Keeps what is drawn for one purpose apart from what other seeds of the same value draw.
+_ERRORS_OF_POSES = 1_700_013
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,9 +85,15 @@ class EpisodeRngs:
     perturbation: np.random.Generator
 
     @classmethod
-    def from_seed(cls, seed: int) -> "EpisodeRngs":
-        """Derive all of them from one seed."""
-        noise, candidates, policy, perturbation = np.random.default_rng(seed).spawn(4)
+    def of_episode(cls, scene: Scene, seed: int) -> "EpisodeRngs":
+        """Derive all of them from a seed; errors of poses from the scene as well.
+
+        An episode draws one such error, or a few: with the same ones in every scene, many episodes
+        would tell no more than one.
+        """
+        noise, candidates, policy = np.random.default_rng(seed).spawn(3)
+        words = (_ERRORS_OF_POSES, seed, zlib.crc32(scene.config.title.encode()))
+        perturbation = np.random.default_rng(words)
         return cls(noise=noise, candidates=candidates, policy=policy, perturbation=perturbation)
 
 

@@ -11,7 +11,8 @@ from sr_mj.assemble import assembled, lifter_for, make_policy
 from sr_mj.episode import PLACE_LOOKS, has_succeeded, is_handed_over, run_episode
 from sr_mj.judge import object_in_gripper
 from sr_mj.outcome import Reason
-from sr_mj.perturbation import PosePerturbation
+from sr_mj.perturbation import PoseError, PosePerturbation
+from sr_mj.pipeline import EpisodeRngs
 from sr_mj.planning import Planner
 from sr_mj.scene import Goal, PlaceGoal, SceneConfig, make_scene
 from sr_mj.scene.placement import find_object, is_placed, place_region
@@ -205,16 +206,16 @@ class Prefers:
         return ActionScores(logits=-np.arange(len(candidates), dtype=float))
 
 
-class Lowers:
-    """Errs by a known distance downwards."""
+class Errs:
+    """Errs by known distances, one after the other, and remembers how many were asked for."""
 
-    def __init__(self, distance_m):
-        self.shift = np.array([0, 0, -distance_m])
+    def __init__(self, *shifts_m):
+        self.shifts_m, self.num_drawn = shifts_m, 0
 
-    def apply(self, candidates, rng):
-        poses = candidates.Ts_world_tool.copy()
-        poses[:, :3, 3] += self.shift
-        return replace(candidates, Ts_world_tool=poses)
+    def draw(self, rng):
+        shift = self.shifts_m[min(self.num_drawn, len(self.shifts_m) - 1)]
+        self.num_drawn += 1
+        return PoseError(shift_m=np.array(shift), turn_rad=np.zeros(3))
 
 
 def test_an_error_changes_neither_the_choice_nor_is_it_avoided(act):
@@ -222,7 +223,7 @@ def test_an_error_changes_neither_the_choice_nor_is_it_avoided(act):
     x, y, _ = scene.data.xipos[find_object(scene, "tuna_can").body.body_id]
     over_can, lower_m = (x, y, 0.1), 0.08
     changes = {"generator": Proposes("pick", over_can, NEAR), "policy": Prefers()}
-    for perturbation, z in ((None, 0.1), (Lowers(lower_m), 0.1 - lower_m)):
+    for perturbation, z in ((None, 0.1), (Errs((0, 0, -lower_m)), 0.1 - lower_m)):
         (attempt,) = act(
             "a lemon", changes=changes | {"perturbation": perturbation}, max_attempts=1
         )[1]
@@ -242,3 +243,53 @@ def test_a_place_that_cannot_be_reached_is_final_if_kept(act):
     attempts = act("give me the lemon, put it near the apple", changes=changes)[1]
     (place,) = (a for a in attempts if a.kind == "place")
     assert place.outcome.reason is Reason.UNREACHABLE
+
+
+def test_an_error_into_the_table_ends_on_it(act):
+    low_m = -0.04
+    down = Errs((0.01, 0, low_m - NEAR[2]))
+    changes = {
+        "generator": Proposes("pick", NEAR),
+        "perturbation": down,
+        "policy": Prefers(),
+    }
+    (attempt,) = act("a lemon", changes=changes, max_attempts=1)[1]
+    x, y, z = attempt.plan.T_world_tool[:3, 3]
+    np.testing.assert_allclose((x, y), (0.51, 0.0))
+    # Of poses 5 mm apart, the lowest at which the gripper is not in the table.
+    rise = (z - low_m) / 0.005
+    assert rise == pytest.approx(round(rise)) and rise > 0
+    alone = attempt.candidates.take(np.array([0]))
+    heights = {}
+    for height in (z, z - 0.005):
+        pose = attempt.plan.T_world_tool.copy()
+        pose[2, 3] = height
+        heights[height] = Planner().reachable(replace(alone, Ts_world_tool=pose[None]))[0]
+    assert heights == {z: True, z - 0.005: False}
+    # What was chosen is remembered, not where the arm went.
+    np.testing.assert_array_equal(attempt.chosen_pose[:3, 3], NEAR)
+
+
+def test_of_one_placement_there_is_one_error_however_often_it_is_looked_for(act):
+    # No arm reaches the first, and the second would be none.
+    errs = Errs((0, 0, 0), (2.0, 0, 0), (0, 0, 0))
+    goal = "give me the lemon, put it near the apple"
+    _, attempts = act(goal, changes={"perturbation": errs})
+    pick, *places = attempts
+    assert pick.outcome.success
+    assert [a.outcome.reason for a in places] == [Reason.UNREACHABLE] * PLACE_LOOKS
+    assert errs.num_drawn == 2
+
+
+def test_errors_differ_from_scene_to_scene_and_nothing_else_does():
+    scenes = [make_scene(SceneConfig(scene="single", seed=seed)) for seed in (0, 1)]
+    first, second = (EpisodeRngs.of_episode(scene, 5) for scene in scenes)
+    again = EpisodeRngs.of_episode(scenes[0], 5)
+    draws = {}
+    for name in ("noise", "candidates", "policy", "perturbation"):
+        rngs = (getattr(r, name) for r in (first, second, again))
+        draws[name] = [rng.random() for rng in rngs]
+    for name, (one, other, repeated) in draws.items():
+        assert one == repeated
+        assert (one == other) is (name != "perturbation")
+    assert len({one for one, *_ in draws.values()}) == len(draws)

@@ -5,7 +5,6 @@ from scipy.spatial.transform import Rotation
 from policy.actions import ActionCandidates
 from sr_mj.memory import FailedGrasps
 from sr_mj.outcome import Outcome, Reason
-from sr_mj.planning import Plan
 
 
 def pose(x, yaw_deg=0.0, tilt_deg=0.0):
@@ -27,8 +26,7 @@ def candidates(*poses):
 
 def failed_at(T, reason=Reason.SLIPPED_CARRY):
     memory = FailedGrasps()
-    plan = Plan(chosen=0, T_world_tool=T, segments=())
-    memory.record(plan, Outcome(success=False, reason=reason))
+    memory.record(T, Outcome(success=False, reason=reason))
     return memory
 
 
@@ -56,9 +54,8 @@ def test_keeps_everything_if_only_repeats_remain():
 
 def test_forgets_when_something_was_carried_away():
     memory = failed_at(pose(0.5))
-    plan = Plan(chosen=0, T_world_tool=pose(0.6), segments=())
     # Slipped or not, the fingers felt it to the end: the robot knows no more.
-    memory.record(plan, Outcome(success=False, reason=Reason.SLIPPED_CARRY, felt_to_end=True))
+    memory.record(pose(0.6), Outcome(success=False, reason=Reason.SLIPPED_CARRY, felt_to_end=True))
     assert len(memory.without(candidates(pose(0.5), pose(0.6)))) == 2
 
 

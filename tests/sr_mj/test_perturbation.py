@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from policy.actions import ActionCandidates
 from sr_mj.errors import ConfigError
-from sr_mj.perturbation import PosePerturbation
+from sr_mj.perturbation import PoseError, PosePerturbation, raised
 
 
 def candidates(num):
@@ -20,38 +20,53 @@ def candidates(num):
 
 
 def test_errors_have_the_stated_spread():
-    before = candidates(4000)
-    perturbation = PosePerturbation(sigma_m=0.01, sigma_deg=5)
-    after = perturbation.apply(before, np.random.default_rng(2))
-    shift = after.positions - before.positions
-    turns = after.Ts_world_tool[:, :3, :3] @ before.Ts_world_tool[:, :3, :3].transpose(0, 2, 1)
-    rotvec = np.degrees(Rotation.from_matrix(turns).as_rotvec())
+    perturbation, rng = PosePerturbation(sigma_m=0.01, sigma_deg=5), np.random.default_rng(2)
+    errors = [perturbation.draw(rng) for _ in range(4000)]
+    shift = np.array([error.shift_m for error in errors])
+    turn = np.degrees([error.turn_rad for error in errors])
     # Four standard errors of a standard deviation from 4000 draws.
     np.testing.assert_allclose(shift.std(axis=0), 0.01, rtol=4 / np.sqrt(8000))
-    np.testing.assert_allclose(rotvec.std(axis=0), 5, rtol=4 / np.sqrt(8000))
+    np.testing.assert_allclose(turn.std(axis=0), 5, rtol=4 / np.sqrt(8000))
     np.testing.assert_allclose(shift.mean(axis=0), 0, atol=4 * 0.01 / np.sqrt(4000))
+    # The six are independent of one another.
+    correlation = np.corrcoef(np.hstack([shift, turn]).T)
+    np.testing.assert_allclose(correlation, np.eye(6), atol=5 / np.sqrt(4000))
+
+
+def test_an_error_moves_in_the_world_and_turns_about_the_tool_point():
+    before, turn = candidates(6), np.radians([0, 0, 90])
+    after = PoseError(shift_m=np.array([0.01, -0.02, 0.03]), turn_rad=turn).apply(before)
+    np.testing.assert_allclose(after.positions - before.positions, [[0.01, -0.02, 0.03]] * 6)
+    axes, turned = before.Ts_world_tool[:, :3, :3], after.Ts_world_tool[:, :3, :3]
+    # A quarter turn about the world's vertical: x becomes y, and y becomes -x.
+    np.testing.assert_allclose(turned[:, 0], -axes[:, 1], atol=1e-12)
+    np.testing.assert_allclose(turned[:, 1], axes[:, 0], atol=1e-12)
+    np.testing.assert_allclose(turned[:, 2], axes[:, 2], atol=1e-12)
     assert after.kind == "place"
     np.testing.assert_array_equal(after.width_m, before.width_m)
     np.testing.assert_array_equal(after.prior, before.prior)
 
 
 def test_the_two_errors_are_drawn_independently():
-    both = PosePerturbation(sigma_m=0.01, sigma_deg=5)
-    only_position = PosePerturbation(sigma_m=0.01)
-    first, second = (
-        p.apply(candidates(5), np.random.default_rng(3)) for p in (both, only_position)
+    both, only_position = (
+        PosePerturbation(sigma_m=0.01, sigma_deg=5),
+        PosePerturbation(sigma_m=0.01),
     )
-    np.testing.assert_array_equal(first.positions, second.positions)
-    np.testing.assert_allclose(
-        second.Ts_world_tool[:, :3, :3], candidates(5).Ts_world_tool[:, :3, :3], atol=1e-12
-    )
+    first, second = (p.draw(np.random.default_rng(3)) for p in (both, only_position))
+    np.testing.assert_array_equal(first.shift_m, second.shift_m)
+    assert not second.turn_rad.any() and first.turn_rad.all()
+    nothing = PosePerturbation().draw(np.random.default_rng(0)).apply(candidates(3))
+    np.testing.assert_allclose(nothing.Ts_world_tool, candidates(3).Ts_world_tool, atol=1e-12)
 
 
-def test_no_error_and_no_candidates():
-    poses = candidates(3)
-    same = PosePerturbation().apply(poses, np.random.default_rng(0))
-    np.testing.assert_allclose(same.Ts_world_tool, poses.Ts_world_tool, atol=1e-12)
-    assert len(PosePerturbation(sigma_m=0.01).apply(candidates(0), np.random.default_rng(0))) == 0
+def test_a_pose_is_raised_step_by_step():
+    before = candidates(2)
+    poses = raised(before.take(np.array([1])))
+    np.testing.assert_array_equal(poses.Ts_world_tool[0], before.Ts_world_tool[1])
+    rises = poses.positions - before.positions[1]
+    np.testing.assert_allclose(rises[:, 2], np.arange(21) * 0.005, atol=1e-7)
+    assert not rises[:, :2].any()
+    assert (poses.width_m == before.width_m[1]).all() and poses.kind == "place"
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def run_one(config: BenchConfig, kind: str, seed: int) -> Iterator[dict]:
         pose = pipeline.executor.T_world_grasp
         if attempt is None or attempt.percept is None or name is None or pose is None:
             return
-        views = look(scene, pipeline, EpisodeRngs.from_seed(seed).noise)
+        views = look(scene, pipeline, EpisodeRngs.of_episode(scene, seed).noise)
         after = lifter.perceive(views, "thing").geometry
         before, width_m = attempt.percept.geometry, pipeline.executor.drive.width_m
         true = _true_points(scene, name) @ pose[:3, :3].T + pose[:3, 3]
