@@ -78,8 +78,14 @@ class Judge:
         self._regions: tuple[PlaceRegion, ...] = ()
 
     def lifted_object(self, rise_m: float) -> str | None:
-        """Return the object that rose by more than `rise_m` and is nearest to the tool."""
+        """Return the object that rose by more than `rise_m` in the gripper's fingers.
+
+        If they hold none that rose, that is the one nearest to the tool: something else may be
+        between what rose and a finger. What lies on a held object is not held.
+        """
         lifted = [n for n, c in self._centers().items() if c[2] - self._start[n][2] > rise_m]
+        if (held := object_in_gripper(self._scene)) in lifted:
+            return held
         return min(
             lifted, key=lambda n: float(np.linalg.norm(self.position_in_tool(n))), default=None
         )
@@ -132,13 +138,13 @@ class Judge:
         return bool(np.all(still))
 
     def place_reason(self, moved: str) -> Reason:
-        """Say how the placing of an object ended, once everything is calm."""
+        """Say how the placing of an object ended, once everything is calm, or has had its time."""
         if self._has_left(_center(self._scene, moved)):
             return Reason.KNOCKED_OFF
-        if any(is_placed(self._scene, moved, region) for region in self._regions):
-            return Reason.PLACED
         if not self.is_calm(moved):
             return Reason.TIMED_OUT
+        if any(is_placed(self._scene, moved, region) for region in self._regions):
+            return Reason.PLACED
         turn = self._scene.T_world_object(moved)[:3, :3] @ self._release.T
         # How far the vertical moved; a turn about it is no topple.
         tilt = np.arccos(np.clip(turn[2, 2], -1, 1))
@@ -147,15 +153,15 @@ class Judge:
     def missed_m(self, moved: str) -> float | None:
         """Return the distance from an object to the nearest valid place; None without regions.
 
-        An object that is where it should be, but touches what it should not or lies outside the
-        workspace, has missed by 1 mm.
+        An object that is where it should be, but touches what it should not, lies outside the
+        workspace or still moves, has missed by 1 mm.
         """
         if not self._regions:
             return None
         gaps = []
-        has_left = self._has_left(_center(self._scene, moved))
+        may_count = self.is_calm(moved) and not self._has_left(_center(self._scene, moved))
         for region in self._regions:
-            if is_placed(self._scene, moved, region) and not has_left:
+            if may_count and is_placed(self._scene, moved, region):
                 return 0.0
             gap = self._gap(region, shapely.Point(_center(self._scene, moved)[:2]))
             gaps.append(max(gap, _TOUCHED_MISS_M))

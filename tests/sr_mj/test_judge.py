@@ -113,6 +113,16 @@ def test_what_still_moves_has_timed_out(scene):
     assert judge.place_reason("plum") is Reason.TIMED_OUT
 
 
+def test_what_still_moves_where_it_should_be_is_not_placed(scene):
+    judge = judge_of_placing(scene, "block_cube")
+    put(scene, "block_cube", above(scene, "tuna_can", 0.06))
+    assert judge.place_reason("block_cube") is Reason.PLACED
+    scene.data.qvel[find_object(scene, "block_cube").body.dof_adr] = 0.1
+    assert is_placed(scene, "block_cube", place_region(scene, "on", "tuna_can", moved="block_cube"))
+    assert judge.place_reason("block_cube") is Reason.TIMED_OUT
+    assert judge.missed_m("block_cube") == 1e-3
+
+
 def test_the_nearest_object_that_rose_was_lifted(scene):
     judge = Judge(scene)
     assert judge.lifted_object(0.05) is None
@@ -121,6 +131,25 @@ def test_the_nearest_object_that_rose_was_lifted(scene):
     tool = scene.data.site("ur5/gripper/tool").xpos
     gaps = {name: np.linalg.norm(center(scene, name) - tool) for name in ("plum", "apple")}
     assert judge.lifted_object(0.05) == min(gaps, key=gaps.get)
+
+
+def test_what_the_fingers_hold_was_lifted_and_not_what_lies_nearer(scene):
+    scene = replace(scene, goal=Goal(text="give me the apple", targets=("apple",)))
+    judge = Judge(scene)
+    tool = scene.data.site("ur5/gripper/tool")
+    closing = tool.xmat.reshape(3, 3)[:, 0].copy()
+    for name, shift in (("apple", -0.045), ("plum", 0.034)):
+        put(scene, name, tool.xpos + shift * closing, seconds=0)
+    mujoco.mj_forward(scene.model, scene.data)
+    gaps = [np.linalg.norm(judge.position_in_tool(name)) for name in ("plum", "apple")]
+    assert gaps == sorted(gaps)
+    assert judge.lifted_object(0.05) == "apple"
+    # What the fingers hold, but did not raise, is not lifted.
+    later = Judge(scene)
+    assert later.lifted_object(0.05) is None
+    put(scene, "tuna_can", above(scene, "tuna_can", 0.3), seconds=0)
+    mujoco.mj_forward(scene.model, scene.data)
+    assert object_in_gripper(scene) == "apple" and later.lifted_object(0.05) == "tuna_can"
 
 
 def test_reward_falls_with_the_distance_to_the_target(scene):
