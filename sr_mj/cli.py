@@ -1,5 +1,6 @@
 """What every command line shares: configuration from arguments, errors in one line."""
 
+import errno
 import sys
 import warnings
 from collections.abc import Callable
@@ -10,6 +11,7 @@ import tyro
 Config = TypeVar("Config")
 
 USAGE_ERROR = 2
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 _SIM_PACKAGES = (
     *("daqp", "dm_control", "imageio", "jsonschema", "lxml", "manifold3d"),
@@ -47,9 +49,12 @@ def run_command(config_type: type[Config], body: Callable[[Config], int], descri
         status = USAGE_ERROR
     except OSError as error:
         # A path that cannot be read or written, a full disk; anything else is a fault of ours.
-        if error.filename is None:
+        if error.filename is not None:
+            print(f"error: {error.filename}: {error.strerror}.", file=sys.stderr)
+        elif error.errno in _FULL:
+            print(f"error: {error.strerror}; make room and try again.", file=sys.stderr)
+        else:
             raise
-        print(f"error: {error.filename}: {error.strerror}.", file=sys.stderr)
         status = USAGE_ERROR
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

@@ -207,6 +207,7 @@ def _run_missing(
     from tqdm import tqdm
 
     from sr_mj.evaluation.identity import Identity
+    from sr_mj.evaluation.plan import Episode
     from sr_mj.evaluation.pool import run_episodes
     from sr_mj.provenance import to_json
 
@@ -214,16 +215,17 @@ def _run_missing(
     # Every line, planned now or not: all of them end in the same rows of the report.
     for episode, record in folder.lines.items():
         identity.check(episode, record)
-    if config.retry_errors:
-        folder.drop([e for e in episodes if folder.lines.get(e, {}).get("error")])
     about = {"config": config, "git_revision": setting.revision, "versions": setting.versions}
     (folder.path / "run.json").write_text(to_json(about))
-    missing = [episode for episode in episodes if episode not in folder.lines]
+    done = folder.lines
+    # What is run again stays on the disk until it has a new result.
+    failed = {e for e in done if done[e]["error"]} if config.retry_errors else set[Episode]()
+    missing = [episode for episode in episodes if episode not in done or episode in failed]
     lost: list[str] = []
     with closing(run_episodes(missing, setting, workers=config.workers, ray=config.ray)) as running:
-        for done in tqdm(running, desc="episodes", total=len(missing)):
-            folder.add(done)
-            lost += [] if done.lost_pictures is None else [done.lost_pictures]
+        for ended in tqdm(running, desc="episodes", total=len(missing)):
+            folder.add(ended)
+            lost += [] if ended.lost_pictures is None else [ended.lost_pictures]
     folder.finish()
     if lost:
         print(

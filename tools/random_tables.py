@@ -1,6 +1,7 @@
 """Tables of random scenes, each of which was run once."""
 
 from collections.abc import Callable
+from math import isnan
 from typing import Any
 
 from sr_mj.evaluation.results import Lines
@@ -28,7 +29,7 @@ def random_table(scene: str, split: str) -> Callable[[Lines], str]:
         policies = by_policy(by_group(lines).get(group, []))
         num_scenes = max(map(len, policies.values()), default=0)
         found = {label: own for label, own in policies.items() if len(own) == num_scenes}
-        better = {c.against: c for c in compare(found)} if found else {}
+        better = {c.against: c for c in compare(found) if c.policy == "sr"} if found else {}
         heading = ["policy", f"{num_scenes} scenes", "steps", "SR minus this: success", "steps"]
         rows = [_row(label, found[label], better) for label in ORDER if label in found]
         if scene in ONE_ATTEMPT:
@@ -44,4 +45,6 @@ def _row(label: str, own: list[dict[str, Any]], better: dict[str, Comparison]) -
     if (c := better.get(label)) is None:
         return [*row, "", ""]
     success = f"{c.success.value * 100:.1f} {points(c.success_elsewhere)}".replace("-0.0", "0.0")
-    return [*row, success, f"{c.steps.value:.2f} [{c.steps.low:.2f}, {c.steps.high:.2f}]"]
+    ends = (c.steps.low, c.steps.high)
+    shown = ", ".join("-" if isnan(end) else f"{end:.2f}" for end in ends)
+    return [*row, success, f"{c.steps.value:.2f} [{shown}]"]

@@ -1,6 +1,7 @@
 """What the tables of results look like: names, order, numbers."""
 
 from collections.abc import Iterable
+from math import isnan
 
 from sr_mj.evaluation.statistics import Interval
 
@@ -29,9 +30,9 @@ def percent(interval: Interval) -> str:
 
 
 def points(interval: Interval | None) -> str:
-    """Write the ends of a difference's interval, in percentage points."""
-    if interval is None:
-        return "[]"
+    """Write the ends of a difference's interval, in percentage points; dashes if it has none."""
+    if interval is None or isnan(interval.low):
+        return "[-, -]"
     low, high = (round(end * 100) for end in (interval.low, interval.high))
     return f"[{low}, {high}]"
 

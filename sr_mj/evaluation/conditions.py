@@ -16,6 +16,11 @@ _FORMS = {
     "l515": re.compile(rf"l515-{_NUMBER}x"),
     "pose": re.compile(rf"pose-{_NUMBER}cm-{_NUMBER}deg"),
 }
+_LARGEST = {
+    "points": (10.0, "Noise of the points, in half extents of the workspace,"),
+    "l515": (100.0, "Factor of the sensor's noise"),
+}
+_LEAST_FACTOR = 0.01
 FORMS = ("clean", "reworded", "points-SIGMA", "l515-FACTORx", "pose-CMcm-DEGdeg")
 """How conditions are written."""
 
@@ -98,10 +103,11 @@ def read_condition(name: str) -> Condition:
         name: One of `FORMS`, with numbers.
 
     Returns:
-        The condition.
+        The condition, named in the one way that numbers are written here: "points-0.10" is
+        "points-0.1".
 
     Raises:
-        ConfigError: If the name has another form, or a pose error is out of range.
+        ConfigError: If the name has another form, or a number is out of range.
     """
     if name == "clean":
         return Condition(name=name)
@@ -109,15 +115,25 @@ def read_condition(name: str) -> Condition:
         return Condition(name=name, is_reworded=True)
     for kind, form in _FORMS.items():
         if match := form.fullmatch(name):
-            values = [float(text) for text in match.groups()]
-            if kind == "points":
-                return Condition(name=name, point_sigma=values[0])
-            if kind == "l515":
-                return Condition(name=name, sensor_factor=values[0])
-            condition = Condition(name=name, pose_sigma_cm=values[0], pose_sigma_deg=values[1])
-            condition.perturbation()
-            return condition
+            return _numbered(kind, *(float(text) for text in match.groups()))
     raise ConfigError(
         f"Condition {name!r} is not understood; expected one of {', '.join(FORMS)}, for example "
         "points-0.1 or pose-1cm-5deg."
     )
+
+
+def _numbered(kind: str, value: float, degrees: float = 0.0) -> Condition:
+    if kind == "pose":
+        condition = Condition(
+            name=f"pose-{value:g}cm-{degrees:g}deg", pose_sigma_cm=value, pose_sigma_deg=degrees
+        )
+        condition.perturbation()
+        return condition
+    largest, what = _LARGEST[kind]
+    if value > largest:
+        raise ConfigError(f"{what} is {value:g}; expected 0 to {largest:g}.")
+    if kind == "points":
+        return Condition(name=f"points-{value:g}", point_sigma=value)
+    if 0 < value < _LEAST_FACTOR:
+        raise ConfigError(f"{what} is {value:g}; expected 0, or {_LEAST_FACTOR:g} to {largest:g}.")
+    return Condition(name=f"l515-{value:g}x", sensor_factor=value)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from models.importing.store import write_atomically
 from sr_mj.errors import ConfigError
 from sr_mj.evaluation.mixture import is_same_result, mixtures
 from sr_mj.evaluation.page import page
@@ -26,6 +27,11 @@ Seconds = dict[Episode, dict[str, float]]
 _TITLE = "Evaluation"
 _TOO_LONG = ("goals", "attempts")
 """Tables that the page and CSV files have, but markdown does not."""
+TABLES = (
+    *("overview", "success", "differences", "causes"),
+    *("paper-1", "paper-2", "paper-3", "paper-4", *_TOO_LONG, "seconds"),
+)
+"""Names of all tables; a report has those of them that have rows."""
 
 
 def merge_results(paths: Sequence[Path]) -> tuple[Lines, Seconds, tuple[Path, ...]]:
@@ -56,7 +62,7 @@ def merge_results(paths: Sequence[Path]) -> tuple[Lines, Seconds, tuple[Path, ..
                     f"{str(path)!r} has another result of {episode.key} than the paths before it; "
                     "leave one of them out."
                 )
-        seconds.update(times)
+        seconds = times | seconds
     folders = (path if path.is_dir() else path.parent for path in paths)
     return lines, seconds, tuple(folder / "pictures" for folder in folders)
 
@@ -89,23 +95,24 @@ def write_report(out: Path, lines: Lines, seconds: Seconds, pictures: Sequence[P
     tables = [table for table in tables if table.rows]
     intro, notes = _about(lines), warnings_about(lines)
     short = [table for table in tables if table.name not in _TOO_LONG]
-    _write_markdown(out / "report.md", intro, notes, short)
     folder = out / "tables"
     folder.mkdir(exist_ok=True)
+    for name in TABLES:
+        # Of an earlier report, made of other results.
+        (folder / f"{name}.csv").unlink(missing_ok=True)
     for table in tables:
-        (folder / f"{table.name}.csv").write_text(table.csv())
+        write_atomically(folder / f"{table.name}.csv", table.csv().encode())
     html = page(_TITLE, intro, notes, tables, lines, pictures)
-    (out / "report.html").write_text(html)
+    write_atomically(out / "report.html", html.encode())
+    write_atomically(out / "report.md", _markdown(intro, notes, short).encode())
     shown = "\n".join(success.markdown().splitlines()[4:])
     told = "".join(f"Note: {note}\n" for note in notes)
     return f"{shown}\n{told}Report {out / 'report.html'}, {out / 'report.md'}, {folder}"
 
 
-def _write_markdown(
-    path: Path, intro: Sequence[str], notes: Sequence[str], tables: Sequence[Table]
-) -> None:
+def _markdown(intro: Sequence[str], notes: Sequence[str], tables: Sequence[Table]) -> str:
     paragraphs = [f"# {_TITLE}", *intro, *(f"**Note.** {note}" for note in notes)]
-    path.write_text("\n\n".join(paragraphs) + "\n\n" + "\n".join(t.markdown() for t in tables))
+    return "\n\n".join(paragraphs) + "\n\n" + "\n".join(t.markdown() for t in tables)
 
 
 def _about(lines: Lines) -> list[str]:

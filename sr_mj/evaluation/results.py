@@ -4,7 +4,9 @@ import fcntl
 import gzip
 import json
 import os
+import zlib
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -62,7 +64,9 @@ class ResultFolder:
         """Close and unlock; a journal that has nothing left to say goes."""
         if not self._journal.tell():
             (self.path / _JOURNAL).unlink()
-        self._journal.close()
+        # What did not fit on a full disk was told when it was written.
+        with suppress(OSError):
+            self._journal.close()
 
     def add(self, done: Done) -> None:
         """Write down what came of an episode; it is on the disk when this returns."""
@@ -75,13 +79,6 @@ class ResultFolder:
         if done.traceback is not None:
             with (self.path / _ERRORS).open("a") as file:
                 file.write(f"{done.episode.key}\n{done.traceback.rstrip()}\n\n")
-
-    def drop(self, episodes: Iterable[Episode]) -> None:
-        """Forget the results of episodes, so that they run again."""
-        for episode in episodes:
-            del self.lines[episode]
-            self.seconds.pop(episode, None)
-        self.finish()
 
     def finish(self) -> None:
         """Write all lines in canonical order, and empty the journal."""
@@ -149,7 +146,7 @@ def _read_file(
         # Before anything is decoded: the cut may go through a letter.
         data = data[: data.rfind(b"\n") + 1] if is_cut else data
         return [_read_line(n, line, check) for n, line in enumerate(data.splitlines(), start=1)]
-    except (OSError, EOFError, ValueError) as error:
+    except (OSError, EOFError, ValueError, zlib.error) as error:
         raise ConfigError(
             f"Results {str(path)!r} cannot be read ({error}); give a folder that "
             "python -m sr_mj.eval wrote, or its episodes.jsonl.gz."

@@ -152,10 +152,11 @@ class Comparison:
         against: Label of the other.
         pairs: Episodes that both ran.
         success: Difference of the success rates; interval for other seeds on these scenes, its ends
-            nan if every scene was run once, which tells nothing of other seeds.
+            nan if every scene was run once, which tells nothing of other seeds, or if no pair
+            differs from another, which does not tell how much they may.
         success_elsewhere: The same, with an interval for other scenes too; None if there is only
             one, which tells nothing of others.
-        steps: Difference of the steps; interval for other seeds on these scenes.
+        steps: Difference of the steps; interval for other seeds on these scenes, as `success`.
         wins: Pairs in which only `policy` succeeded.
         losses: Pairs in which only `against` did.
     """
@@ -223,7 +224,7 @@ def _compare_pairs(ours: str, other: str, pairs: Pairs) -> Comparison:
     if is_random and len(pairs) > 1:
         elsewhere = within
     elif len(pairs) > 1:
-        elsewhere = paired_bootstrap(success, rng, are_groups_drawn=True)
+        elsewhere = _if_varying(success, paired_bootstrap(success, rng, are_groups_drawn=True))
     differences = [d for group in success for d in group]
     return Comparison(
         policy=ours,
@@ -241,5 +242,14 @@ def _on_other_seeds(groups: list[list[float]], rng: np.random.Generator) -> Inte
     """Estimate a mean; without ends if no scene was run twice, as if none could vary."""
     found = paired_bootstrap(groups, rng)
     if any(len(group) > 1 for group in groups):
-        return found
+        return _if_varying(groups, found)
+    return _without_ends(found)
+
+
+def _if_varying(groups: list[list[float]], found: Interval) -> Interval:
+    """Take the ends of an interval away if all differences are equal: it would be a point."""
+    return found if len({d for group in groups for d in group}) > 1 else _without_ends(found)
+
+
+def _without_ends(found: Interval) -> Interval:
     return Interval(value=found.value, low=float("nan"), high=float("nan"))

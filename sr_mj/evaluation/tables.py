@@ -96,7 +96,7 @@ def comparison_table(lines: Lines) -> Table:
             f"{c.policy} - {c.against}",
             c.pairs,
             _estimate(c.success),
-            c.success_elsewhere,
+            None if c.success_elsewhere is None else _estimate(c.success_elsewhere),
             c.wins,
             c.losses,
             _estimate(c.steps),
@@ -111,8 +111,9 @@ def comparison_table(lines: Lines) -> Table:
             "The same scenes with the same seeds. Percentage points of success with 95 % intervals "
             "by the paired bootstrap: first for other seeds on these scenes, where they were run "
             "more than once; then for other scenes too, where there are more than one. With two or "
-            "three scenes the second is too narrow to be trusted. Wins are pairs in which only "
-            "the first policy succeeded."
+            "three scenes the second is too narrow to be trusted. Where no pair differs from "
+            "another, nothing tells how much others might, and there is no interval. Wins are "
+            "pairs in which only the first policy succeeded."
         ),
         columns=(
             *_GROUP,

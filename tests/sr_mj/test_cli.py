@@ -33,9 +33,16 @@ def fail(options: Options) -> int:
     raise ConfigError("Attempts is 0; expected 1 to 99.")
 
 
+def fill_a_disk(options: Options) -> int:
+    with Path("/dev/full").open("w") as file:
+        file.write("more than it holds")
+    return 0
+
+
 @pytest.mark.parametrize(
     ("body", "line"),
     [
+        (fill_a_disk, "error: No space left on device; make room and try again.\n"),
         (fail, "error: Attempts is 0; expected 1 to 99.\n"),
         (write_into_a_file, f"error: {Path(__file__) / 'below'}: Not a directory.\n"),
     ],

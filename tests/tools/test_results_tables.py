@@ -5,7 +5,15 @@ import pytest
 
 from sr_mj.evaluation.plan import Episode
 from sr_mj.evaluation.results import read_lines
-from tools.results_tables import BLOCKS, TablesConfig, fill_in, main, read_all
+from tools.results_tables import (
+    BLOCKS,
+    TablesConfig,
+    fill_in,
+    main,
+    read_all,
+    scores_beside_weightless,
+    task_table,
+)
 
 ROOT = Path(__file__).parents[2]
 CONFIG = TablesConfig(
@@ -124,7 +132,11 @@ def test_every_instruction_has_a_row(lines):
     some |= under(mine, "clean", success=False, num_actions=8)
     some |= under(mine, "clean", policy="a2", num_actions=3)
     some |= under(mine, "points-0.1", policy="grounding")
-    some |= under(chosen(lines, "oracle", "grasp", "unseen"), "clean", num_actions=2)
+    unseen = chosen(lines, "oracle", "grasp", "unseen")
+    some |= under(unseen, "clean", num_actions=2)
+    # An episode whose process died has no goal.
+    died = {k: v for k, v in unseen[0].items() if k != "goal"}
+    some |= under([died], "clean", policy="vlg", success=False)
     rows = BLOCKS["grasp-goals"](some).splitlines()[2:]
     assert len(rows) == 15
     assert "| seen | give me the thera med | 0.0 [0, 20] | 8.0 | 100 / 5.3 | 3.0 | | |" in rows
@@ -177,9 +189,28 @@ def test_scenes_that_were_run_once_are_compared_as_scenes(lines):
         "| policy | 20 scenes | steps | SR minus this: success | steps |",
         "| --- | --- | --- | --- | --- |",
         "| `sr` | 100 [84, 100] | 2.00 | | |",
-        "| `base` (stage 2 only) | 0.0 [0, 16] | 8.00 | 100.0 [100, 100] | -6.00 [-6.00, -6.00] |",
+        "| `base` (stage 2 only) | 0.0 [0, 16] | 8.00 | 100.0 [-, -] | -6.00 [-, -] |",
     ]
     assert len(BLOCKS["random-place8"](some).splitlines()) == 2
+    # Without SR in all scenes, nothing is said of what it does better.
+    first = next(e for e, r in some.items() if r["policy"] == "sr")
+    some.pop(first)
+    assert BLOCKS["random-cluttered15"](some).splitlines()[2:] == [
+        "| `base` (stage 2 only) | 0.0 [0, 16] | 8.00 | | |"
+    ]
+
+
+def test_differences_are_those_of_sr(lines):
+    plain = chosen(lines, "oracle", "grasp", "seen")
+    known = {"privileged": False, "num_actions": 1}
+    some = under(plain, "clean", policy="grounding", success=True, **known)
+    some |= under(plain, "clean", policy="a2", success=False, **known)
+    assert cells(BLOCKS["differences"](some)) == {}
+    some |= under(plain, "clean", policy="sr", success=True, **known)
+    table = cells(BLOCKS["differences"](some))
+    # Nothing varies, and nothing tells how much it might.
+    assert table["`a2`"]["grasp, seen"] == "100.0 [-, -], [-, -]"
+    assert table["`grounding`"]["grasp, seen"] == "0.0 [-, -], [-, -]"
 
 
 def test_one_attempt_needs_no_count_of_steps(lines):
@@ -202,7 +233,8 @@ def test_rules_without_weights_stand_beside_who_ran_the_same(lines):
     # Who left out some of what does has no row.
     missed = [r for r in plain if r is not first[3]]
     some |= under(missed, "clean", policy="a2", success=True, num_actions=1)
-    assert BLOCKS["weightless-grasp"](some).splitlines()[2:] == [
+    table = task_table("grasp", scores_beside_weightless)(some)
+    assert table.splitlines()[2:] == [
         "| `sr` | 100 [84, 100] | 1.00 | 92.0 / 2.34 | | | 92.4 / 2.50 |",
         "| `lerf-togo` | 100 [84, 100] | 2.00 | 83.3 / 3.37 | | | 76.2 / 2.01 |",
         "| `raw-image` | 100 [84, 100] | 4.00 | 48.1 / 4.35 | | | 45.3 / 5.37 |",

@@ -170,10 +170,12 @@ def resumed(tmp_path, setting, make_done, monkeypatch):
     """Return a function that resumes a folder, and returns the episodes that it ran again."""
     monkeypatch.setattr("sr_mj.eval._setting", lambda *_: setting)
 
-    def resume(before, **options):
+    def resume(before, *, interrupted=False, **options):
         ran = []
 
         def run_episodes(episodes, *_, **__):
+            if interrupted:
+                raise KeyboardInterrupt
             for episode in episodes:
                 ran.append(episode)
                 done = make_done(episode.policy, episode.seed)
@@ -213,6 +215,10 @@ def test_errors_run_again_if_that_is_asked_for(resumed, make_done, capsys, tmp_p
     told = capsys.readouterr().err
     assert "2 episodes ended in an exception and count as failures; " in told
     assert "Pictures of 1 episodes could not be kept (OSError: full); their results are." in told
+    # Killed before anything has run again, the failures are still there.
+    with pytest.raises(KeyboardInterrupt):
+        resumed([], retry_errors=True, interrupted=True)
+    assert sum(line["error"] is not None for line in read_lines(tmp_path)[0].values()) == 2
     assert resumed([], retry_errors=True) == [("random", 0)]
     told = capsys.readouterr().err
     assert "1 episodes ended in an exception" in told and "Pictures" not in told

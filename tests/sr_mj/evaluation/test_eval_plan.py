@@ -181,9 +181,37 @@ def test_conditions_say_what_their_names_say():
         assert read_condition(name).beginning == name
 
 
-def test_absurd_errors_of_the_pose_are_refused():
-    with pytest.raises(ConfigError, match="Perturbation of positions is 50 cm"):
-        read_condition("pose-50cm-0deg")
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("pose-50cm-0deg", "Perturbation of positions is 50 cm; expected 0 to 10."),
+        (
+            "points-20",
+            "Noise of the points, in half extents of the workspace, is 20; expected 0 to 10.",
+        ),
+        ("points-" + "9" * 400, "Noise of the points, .* is inf; expected 0 to 10."),
+        ("l515-101x", "Factor of the sensor's noise is 101; expected 0 to 100."),
+        ("l515-0.001x", "Factor of the sensor's noise is 0.001; expected 0, or 0.01 to 100."),
+    ],
+)
+def test_absurd_conditions_are_refused(name, message):
+    with pytest.raises(ConfigError, match=f"^{message}$"):
+        read_condition(name)
+
+
+@pytest.mark.parametrize("factor", ["0.01", "100"])
+def test_extreme_sensors_are_sensors(factor):
+    assert read_condition(f"l515-{factor}x").sensor_noise().full_well_electrons > 0
+
+
+def test_numbers_are_written_in_one_way():
+    names = ["points-0.10", "points-0.1", "pose-1.0cm-05deg", "l515-02.00x", "points-0"]
+    written = ["points-0.1", "points-0.1", "pose-1cm-5deg", "l515-2x", "points-0"]
+    assert [read_condition(name).name for name in names] == written
+    episodes = plan_suites(
+        ["grasp"], ["seen"], [0], ONE, conditions=names[:2], only=["grasp-seen-00"]
+    )
+    assert {episode.condition for episode in episodes} == {"points-0.1"}
 
 
 def test_sensor_noise_is_scaled_and_can_be_switched_off():

@@ -18,7 +18,7 @@ from sr_mj.evaluation.published import (
     kind_of_policy,
     plain_goal,
 )
-from sr_mj.evaluation.report import merge_results, warnings_about, write_report
+from sr_mj.evaluation.report import TABLES, merge_results, warnings_about, write_report
 from sr_mj.evaluation.results import ResultFolder, snapshot_path
 from sr_mj.evaluation.statistics import Interval, paired_bootstrap, wilson
 from sr_mj.evaluation.summary import (
@@ -150,6 +150,35 @@ def test_one_run_of_each_arrangement_tells_nothing_of_other_seeds(make_done, as_
     )  # fmt: skip
     only_one = as_lines(d for d in dones if d.episode.scene == "grasp-seen-01")
     assert comparison_table(only_one).shown()[0][5:7] == ("+100.0", "")
+
+
+def test_where_nothing_varies_there_is_no_interval(make_done, as_lines):
+    """Of two policies that win every time, nobody knows how often one of them would not."""
+    dones = [
+        make_done(policy, seed, scene=scene, reasons=GOOD if seed or policy == "sr" else BAD + GOOD)
+        for policy in ("sr", "random")
+        for scene in ("grasp-seen-00", "grasp-seen-01")
+        for seed in range(5)
+    ]
+    lines = as_lines(dones)
+    (found,) = compare(group_of(lines))
+    for interval in (found.success, found.success_elsewhere):
+        assert interval.value == 0 and np.isnan([interval.low, interval.high]).all()
+    # The number of steps does vary.
+    assert found.steps.low < found.steps.value < 0
+    assert comparison_table(lines).shown()[0][5:7] == ("+0.0", "+0.0")
+
+
+def test_a_report_leaves_nothing_of_an_earlier_one(make_done, as_lines, tmp_path):
+    write_report(tmp_path, as_lines([make_done("sr"), make_done("random")]), {})
+    before = {path.stem for path in (tmp_path / "tables").iterdir()}
+    assert before <= set(TABLES) and {"paper-1", "paper-4", "goals"} <= before
+    random_scene = {"scene": "cluttered15", "task": "random-cluttered15"}
+    write_report(tmp_path, as_lines([make_done("sr", **random_scene)]), {})
+    after = {path.stem for path in (tmp_path / "tables").iterdir()}
+    assert "success" in after and not {"paper-1", "paper-4", "goals"} & after
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["report.html", "report.md", "tables"]
 
 
 def test_only_common_episodes_are_compared(dones, as_lines):
