@@ -22,8 +22,9 @@ from sr_mj.sensors.capture import capture_views
 from sr_mj.sensors.l515 import L515NoiseConfig
 from sr_mj.sensors.renderer import CameraRig
 
-# Keeps what is drawn for one purpose apart from what other seeds of the same value draw.
+# Keep what is drawn for one purpose apart from what the same seed draws for another.
 _ERRORS_OF_POSES = 1_700_013
+_IN_RANDOM_SCENES = 1_700_021
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,9 +90,12 @@ class EpisodeRngs:
         """Derive all of them from a seed; errors of poses from the scene as well.
 
         An episode draws one such error, or a few: with the same ones in every scene, many episodes
-        would tell no more than one.
+        would tell no more than one. In a scene that was drawn at random, commonly from the same
+        seed, nothing is drawn from the stream that drew the scene.
         """
-        noise, candidates, policy = np.random.default_rng(seed).spawn(3)
+        drawn = scene.config.arranged is None
+        words = [_IN_RANDOM_SCENES, seed] if drawn else [seed]
+        noise, candidates, policy = np.random.default_rng(words).spawn(3)
         words = (_ERRORS_OF_POSES, seed, zlib.crc32(scene.config.title.encode()))
         perturbation = np.random.default_rng(words)
         return cls(noise=noise, candidates=candidates, policy=policy, perturbation=perturbation)

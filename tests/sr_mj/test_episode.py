@@ -293,3 +293,19 @@ def test_errors_differ_from_scene_to_scene_and_nothing_else_does():
         assert one == repeated
         assert (one == other) is (name != "perturbation")
     assert len({one for one, *_ in draws.values()}) == len(draws)
+
+
+def test_an_episode_draws_nothing_from_the_streams_that_drew_its_scene():
+    scene = make_scene(SceneConfig(scene="single", seed=5))
+    of_scene = {rng.random() for rng in np.random.default_rng(5).spawn(3)}
+    rngs = EpisodeRngs.of_episode(scene, 5)
+    first = {rng.random() for rng in (rngs.noise, rngs.candidates, rngs.policy)}
+    assert len(of_scene | first) == 6
+
+
+def test_an_episode_of_an_arrangement_draws_the_same_as_ever():
+    # Recorded runs are repeated by their seed.
+    scene = make_scene(SceneConfig(arrangement="place-seen-00"))
+    rngs = EpisodeRngs.of_episode(scene, 5)
+    expected = [rng.random() for rng in np.random.default_rng(5).spawn(3)]
+    assert [rng.random() for rng in (rngs.noise, rngs.candidates, rngs.policy)] == expected

@@ -122,12 +122,12 @@ def _seen_bodies(
 
 
 def photograph(kind: str, split: str, seed: int) -> BenchScene:
-    """Make a scene and take its views, with the noise that an episode of this seed starts with.
+    """Make a scene and take its views, with sensor noise.
 
     Args:
         kind: Kind of scene, one of `sr_mj.scene.SCENE_KINDS`.
         split: Part of the catalogue.
-        seed: Draws everything.
+        seed: Draws the scene and the noise.
 
     Returns:
         The scene.
