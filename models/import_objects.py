@@ -106,7 +106,10 @@ def main() -> None:
     except ModuleNotFoundError as error:
         if error.name not in _SIM_PACKAGES:
             raise
-        print(f"error: {error.name} is not installed; pip install 'sr-mj[sim]'", file=sys.stderr)
+        print(
+            f"error: {error.name} is not installed; pip install '.[sim]' in a clone",
+            file=sys.stderr,
+        )
         status = _USAGE_ERROR
     except ModelsError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -42,7 +42,10 @@ def run_command(config_type: type[Config], body: Callable[[Config], int], descri
     except ModuleNotFoundError as error:
         if error.name not in _SIM_PACKAGES:
             raise
-        print(f"error: {error.name} is not installed; pip install 'sr-mj[sim]'", file=sys.stderr)
+        print(
+            f"error: {error.name} is not installed; pip install '.[sim]' in a clone",
+            file=sys.stderr,
+        )
         status = USAGE_ERROR
     except (SrMjError, ModelsError, PerceptionError, PolicyError) as error:
         print(f"error: {error}", file=sys.stderr)

@@ -66,7 +66,8 @@ def simplify(mesh: trimesh.Trimesh, num_faces: int = MAX_FACES) -> trimesh.Trime
         import fast_simplification
     except ImportError:
         raise MissingPackageError(
-            "fast-simplification is not installed, it decimates meshes; pip install 'sr-mj[import]'"
+            "fast-simplification is not installed, it decimates meshes; "
+            "pip install '.[import]' in a clone"
         ) from None
     vertices, faces, *_ = fast_simplification.simplify(
         np.asarray(mesh.vertices, np.float64),

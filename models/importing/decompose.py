@@ -61,7 +61,8 @@ def require_coacd() -> None:
     """
     if importlib.util.find_spec(PACKAGE) is None:
         raise MissingPackageError(
-            "coacd is not installed, it cuts meshes into convex parts; pip install 'sr-mj[import]'"
+            "coacd is not installed, it cuts meshes into convex parts; "
+            "pip install '.[import]' in a clone"
         )
 
 

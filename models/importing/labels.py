@@ -81,7 +81,7 @@ def read_labels(path: Path) -> dict[str, Label]:
         import yaml
     except ImportError:
         raise MissingPackageError(
-            "PyYAML is not installed, it reads the words file; pip install 'sr-mj[import]'"
+            "PyYAML is not installed, it reads the words file; pip install '.[import]' in a clone"
         ) from None
     try:
         # Everything as text: YAML would read the key 010 as the number 8.

@@ -134,7 +134,7 @@ def _open_events(folder: Path, last_step: int) -> Any:
     except ImportError:
         print(
             "TensorBoard is not installed, so no event files are written; "
-            "pip install 'sr-mj[train]', or pass --no-tensorboard.",
+            "pip install '.[train]' in a clone, or pass --no-tensorboard.",
             file=sys.stderr,
         )
         return None

@@ -130,7 +130,7 @@ def _connect(address: str, workers: int | None) -> Any:
         import ray
     except ModuleNotFoundError:
         raise ConfigError(
-            "--ray needs Ray, which is not installed; pip install 'sr-mj[ray]'"
+            "--ray needs Ray, which is not installed; pip install '.[ray]' in a clone"
         ) from None
     # A cluster of other machines has its own number of processors.
     local = {"num_cpus": workers, "include_dashboard": False} if address == LOCAL else {}
