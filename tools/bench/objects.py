@@ -9,9 +9,13 @@ import dataclasses
 import json
 import time
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import tyro
 from tqdm import tqdm
+
+if TYPE_CHECKING:
+    from models.objects.words import ObjectWords
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +42,8 @@ def measure(name: str) -> dict:
     ball = drop_ball(item) if is_vessel(item) else None
     return {
         "name": name,
+        "split": item.split,
+        "asked_for": list_words(item.words),
         "size_mm": [round(1e3 * extent) for extent in item.size_m.tolist()],
         "mass_kg": item.mass_kg,
         "triangles": len(item.faces),
@@ -47,6 +53,12 @@ def measure(name: str) -> dict:
         "faults": find_faults(rests, ball),
         "cpu_s": round(time.process_time() - start, 2),
     }
+
+
+def list_words(words: "ObjectWords") -> str:
+    """List the protocol's words for an object: what it is called first, then the general ones."""
+    general = (words.category, *words.colors, *words.shapes, *words.functions)
+    return "; ".join([words.title, *(word for word in general if word)])
 
 
 def row(record: dict) -> str:
@@ -59,6 +71,8 @@ def row(record: dict) -> str:
     kept = "" if ball is None else ("stays" if ball["is_inside"] else "lost")
     cells = (
         record["name"],
+        record["split"],
+        record["asked_for"],
         " x ".join(map(str, record["size_mm"])),
         f"{1e3 * record['mass_kg']:.0f}",
         record["triangles"],
@@ -79,10 +93,10 @@ def main(config: BenchConfig) -> None:
     names = config.objects or [name for split in config.splits for name in object_names(split)]
     records = [measure(name) for name in tqdm(names, desc="objects")]
     print(
-        "| object | size mm | mass g | triangles | parts | settles s | jitter mm/s | "
-        "spin rad/s | sinks mm | ball |"
+        "| object | split | asked for as | size mm | mass g | triangles | parts | settles s | "
+        "jitter mm/s | spin rad/s | sinks mm | ball |"
     )
-    print("|" + " --- |" * 10)
+    print("|" + " --- |" * 12)
     for record in records:
         print(row(record))
     failed = [record for record in records if record["faults"]]
