@@ -9,7 +9,6 @@ the lines do not have is left empty.
 
 import re
 import sys
-from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,9 +22,6 @@ from tools import condition_tables
 from tools.goal_tables import grasp_goals
 from tools.random_tables import random_table
 from tools.table_text import COLUMNS, ORDER, SPLITS, TASKS, markdown, percent, points, title
-
-WEIGHTLESS = ("clip-grounding", "lerf-togo", "think-grasp", "raw-image-grid", "raw-image", "vlp")
-"""Rules that the paper compares with; not `grounding`, which is run everywhere."""
 
 Cells = dict[tuple[str, str], dict[str, Score]]
 """Scores by policy, for every task and kind of objects."""
@@ -60,31 +56,6 @@ def clean_scores(lines: Lines) -> Cells:
     return cells
 
 
-def scores_beside_weightless(lines: Lines) -> Cells:
-    """Count successes on what all of `WEIGHTLESS` ran, of all who ran it too.
-
-    Seeds that they did not run in all scenes are left out: every scene counts as much.
-    """
-    cells = {}
-    for group, found in _clean(lines).items():
-        ran = {label: {_run(r): r for r in own} for label, own in found.items()}
-        if theirs := [set(own) for label, own in ran.items() if label in WEIGHTLESS]:
-            shared = _complete(set.intersection(*theirs))
-            cells[group.task, group.split] = {
-                label: score(label, [own[run] for run in sorted(shared)])
-                for label, own in ran.items()
-                if shared and shared <= own.keys()
-            }
-    return cells
-
-
-def _complete(runs: set[tuple[str, int]]) -> set[tuple[str, int]]:
-    """Leave out runs with seeds that not all scenes have."""
-    scenes = {scene for scene, _ in runs}
-    counts = Counter(seed for _, seed in runs)
-    return {(scene, seed) for scene, seed in runs if counts[seed] == len(scenes)}
-
-
 def overview(lines: Lines) -> str:
     """Return success of all policies in all tasks; with steps where several attempts are made."""
     cells = clean_scores(lines)
@@ -99,21 +70,18 @@ def overview(lines: Lines) -> str:
     return markdown(heading, rows)
 
 
-def task_table(
-    task: str, scores: Callable[[Lines], Cells] = clean_scores
-) -> Callable[[Lines], str]:
+def task_table(task: str) -> Callable[[Lines], str]:
     """Return a function that makes the table of one task, beside the paper's figures.
 
     Args:
         task: Task.
-        scores: Counts what stands in it.
 
     Returns:
-        From lines to the table.
+        From lines to the table. Policies that did not run every episode are left out.
     """
 
     def table(lines: Lines) -> str:
-        cells = scores(lines)
+        cells = clean_scores(lines)
         present = [
             label for label in ORDER if any(label in cells.get((task, s), {}) for s in SPLITS)
         ]
@@ -160,11 +128,12 @@ def differences(lines: Lines) -> str:
 BLOCKS: dict[str, Callable[[Lines], str]] = {
     "overview": overview,
     **{task: task_table(task) for task in TASKS},
-    "weightless-pick-place": task_table("pick-place", scores_beside_weightless),
     "differences": differences,
     "grasp-goals": grasp_goals,
     "random-cluttered15": random_table("cluttered15", "seen"),
     "random-place8": random_table("place8", "seen"),
+    "random-pickplace8-seen": random_table("pickplace8", "seen"),
+    "random-pickplace8-unseen": random_table("pickplace8", "unseen"),
     "noise": condition_tables.noise,
     "perturbation": condition_tables.perturbation,
     "heavy30": condition_tables.heavy30,
@@ -206,10 +175,6 @@ def _clean(lines: Lines) -> dict[Group, dict[str, list[dict[str, Any]]]]:
         for group, records in by_group(lines).items()
         if group.condition == "clean" and group.task in TASKS
     }
-
-
-def _run(record: dict[str, Any]) -> tuple[str, int]:
-    return record["scene"], record["seed"]
 
 
 def _with_steps(found: Score, task: str) -> str:
