@@ -37,6 +37,8 @@ class TablesConfig:
         Path("docs/results/conditions"),
         Path("docs/results/held-out-cluttered15"),
         Path("docs/results/held-out-place8"),
+        Path("docs/results/held-out-pickplace8-seen"),
+        Path("docs/results/held-out-pickplace8-unseen"),
     )
     """Folders of results that are counted together."""
     documents: tuple[Path, ...] = (Path("README.md"), Path("docs/results.md"))
